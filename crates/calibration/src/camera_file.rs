@@ -1,4 +1,4 @@
-//! The camera's file: `camera_info` in the form of ROS's `camera_calibration`, with the camera's pose.
+//! The camera file: `camera_info` in the form of ROS's `camera_calibration`, with the camera's pose.
 //!
 //! ```yaml
 //! image_width: 640
@@ -7,14 +7,14 @@
 //! camera_matrix: {rows: 3, cols: 3, data: [612.3, 0, 318.7, 0, 609.8, 244.1, 0, 0, 1]}
 //! distortion_model: plumb_bob
 //! distortion_coefficients: {rows: 1, cols: 5, data: [-0.28, 0.11, 0.0013, -0.0007, -0.02]}
-//! table:                       # ours; ROS's readers pass over it
+//! table:                       # ours; ROS ignores it
 //!   frame: base                # or: table
 //!   height_m: 0.0              # the table's z in that frame
 //!   frame_from_camera:
 //!     translation_m: [0.5, 0.0, 0.58]
 //!     rotation_xyzw: [1.0, 0.0, 0.0, 0.0]
 //!   workspace_m: {x: [0.3, 0.7], y: [-0.3, 0.3]}   # may be left out
-//! hand_eye:                    # ours; where the camera is on the robot's hand
+//! hand_eye:                    # ours; the camera's pose on the robot's hand
 //!   flange_from_camera: {translation_m: [0.05, 0.0, 0.06], rotation_xyzw: [0.0, 0.0, 0.0, 1.0]}
 //! ```
 
@@ -45,37 +45,37 @@ impl Frame {
     }
 }
 
-/// A camera over a table.
+/// A camera above a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedCamera {
     /// The name in the file.
     pub name: String,
     /// Size, focal length, lens.
     pub intrinsics: PinholeCamera,
-    /// Its pose; `None` in a file of intrinsics only.
+    /// The camera's pose; `None` if the file has only intrinsics.
     pub table: Option<TablePose>,
-    /// For a camera on the hand: from the optical frame to the robot's flange, in metres.
+    /// For a camera on the hand: the transform from the optical frame to the robot's flange, in metres.
     pub flange_from_camera: Option<Isometry3<f64>>,
 }
 
-/// A camera's pose, and the table under it.
+/// A camera's pose and the table below it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TablePose {
     /// The target frame of `frame_from_camera`.
     pub frame: Frame,
-    /// The table's z in the frame.
+    /// The table's z in `frame`, in metres.
     pub height_m: f64,
-    /// From the optical frame (x right, y down, z forward) to the frame, in metres.
+    /// Transform from the optical frame (x right, y down, z forward) to `frame`, in metres.
     pub frame_from_camera: Isometry3<f64>,
-    /// Where parts may lie; `None` for everything that the camera sees.
+    /// The region in which parts may lie; `None` for all that the camera sees.
     pub workspace: Option<Workspace>,
 }
 
-/// Range of the height over the table, metres. Chosen by hand: no grasp was ever taught from a greater distance, and
-/// heights in millimetres are larger.
+/// Range of the camera's height above the table, in metres. Chosen by hand: no grasp was taught from a greater
+/// distance, and a height given in millimetres is out of range.
 const HEIGHTS_M: [f64; 2] = [0.05, 20.0];
-/// Largest distance of camera and workspace from the frame's origin along the table, metres: no hall with an arm is
-/// larger, and positions in millimetres are larger.
+/// Largest horizontal distance of camera and workspace from the frame's origin, in metres: larger than robot cells, and
+/// smaller than positions given in millimetres.
 const MAX_ASIDE_M: f64 = 50.0;
 /// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
@@ -93,7 +93,7 @@ const SECTIONS: [&str; 10] = [
     "table",
     "hand_eye",
 ];
-/// Largest distance of a camera from the flange, metres.
+/// Largest distance of a camera from the flange, in metres.
 const MAX_ON_HAND_M: f64 = 2.0;
 
 #[derive(Deserialize)]
@@ -102,14 +102,14 @@ struct File {
     image_height: u32,
     #[serde(default)]
     camera_name: String,
-    /// Key of the projection in files of Kalibr and others.
+    /// Name of the projection in files of Kalibr and other programs.
     #[serde(default)]
     camera_model: Option<String>,
     #[serde(default)]
     lens_model: Option<String>,
     #[serde(default)]
     projection_model: Option<String>,
-    /// The mirror of an omnidirectional camera.
+    /// The mirror parameter of an omnidirectional camera.
     #[serde(default)]
     xi: Option<f64>,
     #[serde(default)]
@@ -160,13 +160,14 @@ struct Ranges {
 }
 
 impl CalibratedCamera {
-    /// Reads a camera's file.
+    /// Reads a camera file.
     ///
     /// # Errors
-    /// Anything but a `camera_info` of a `plumb_bob` lens, and a pose that is impossible for a camera over a table.
+    /// The file is not a `camera_info` with a `plumb_bob` lens, or has a pose that is impossible for a camera above a
+    /// table.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
-            // The lines after it repeat the position in the file.
+            // Only the first line: the further ones repeat the position in the file.
             let message = error.to_string();
             let first = message.lines().next().unwrap_or_default();
             CameraFileError::Unreadable { found: first.trim_start_matches("error: ").to_owned() }
@@ -179,12 +180,12 @@ impl CalibratedCamera {
         })
     }
 
-    /// The file; [`Self::from_yaml`] reads the same values from it.
+    /// Writes the file; [`Self::from_yaml`] reads the same values from it.
     pub fn to_yaml(&self) -> String {
         self.sections().into_iter().map(|(_, section)| section).collect()
     }
 
-    /// An existing file with this camera's values: data of other programs and comments are kept.
+    /// Returns an existing file with this camera's values. Data of other programs and comments are kept.
     ///
     /// # Errors
     /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.
@@ -196,7 +197,7 @@ impl CalibratedCamera {
         }
     }
 
-    /// Whether both are equal except for the last digits of a quaternion, which is normalised on reading.
+    /// Whether both are equal except for rounding of the quaternions, which are normalised on reading.
     fn is_near(&self, other: &Self) -> bool {
         let poses =
             |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];
@@ -233,19 +234,19 @@ impl CalibratedCamera {
         SECTIONS.into_iter().zip(texts).filter_map(|(name, text)| Some((name, text?))).collect()
     }
 
-    /// The camera in its frame, and the height of the table.
+    /// The camera in its frame, and the frame with the table.
     ///
     /// # Errors
-    /// [`CameraFileError::NoPose`] if that was not measured.
+    /// [`CameraFileError::NoPose`] if the file has none.
     pub fn posed(&self) -> Result<(PosedCamera, &TablePose), CameraFileError> {
         let table = self.table.as_ref().ok_or(CameraFileError::NoPose)?;
         Ok((PosedCamera { intrinsics: self.intrinsics, world_from_camera: table.frame_from_camera }, table))
     }
 
-    /// Whether a picture can be from this camera.
+    /// Checks that a picture can be from this camera.
     ///
     /// # Errors
-    /// [`CameraFileError::OtherSize`] if it has other dimensions.
+    /// [`CameraFileError::OtherSize`] if its dimensions are different.
     pub fn check_picture(&self, (found_width, found_height): (u32, u32)) -> Result<(), CameraFileError> {
         let PinholeCamera { width, height, .. } = self.intrinsics;
         if (width, height) == (found_width, found_height) {
@@ -260,7 +261,7 @@ const PINHOLE_NAMES: [&str; 6] = ["pinhole", "perspective", "plumb_bob", "radtan
 /// Number of points along each side of the picture at which the lens is checked.
 const TRIED_A_SIDE: u32 = 16;
 
-/// Refuses a file that names a non-pinhole camera in another line than `distortion_model`.
+/// Rejects a file in which another field than `distortion_model` names a camera that is not a pinhole.
 fn check_model(file: &File) -> Result<(), CameraFileError> {
     let other = |key, found: &dyn std::fmt::Display| Err(CameraFileError::OtherModel { key, found: found.to_string() });
     let named = [
@@ -280,7 +281,7 @@ fn check_model(file: &File) -> Result<(), CameraFileError> {
     }
 }
 
-/// Refuses a lens that shows one point at two pixels of the picture, or no point at a pixel.
+/// Rejects a lens that shows one point at two pixels of the picture, or no point at a pixel.
 fn check_does_not_fold(camera: &PinholeCamera) -> Result<(), CameraFileError> {
     let [width, height] = [camera.width, camera.height].map(f64::from);
     let border = (0..=TRIED_A_SIDE).map(|step| f64::from(step) / f64::from(TRIED_A_SIDE)).flat_map(|share| {
@@ -401,7 +402,7 @@ fn pose_error(name: &str, expected: &'static str, found: &[f64]) -> CameraFileEr
 mod tests {
     use super::*;
 
-    /// As `ros2 run camera_calibration cameracalibrator` saves it.
+    /// A file saved by `ros2 run camera_calibration cameracalibrator`.
     const OF_ROS: &str = "\
 image_width: 640
 image_height: 480
@@ -499,7 +500,7 @@ table:
                 CameraFileError::Coefficients { .. }
             ));
         }
-        // A barrel distortion so strong that the radius decreases again before the corner; p1 that folds a border.
+        // Barrel distortion so strong that the radius decreases again before the corner; a p1 that folds a border.
         for coefficients in ["[-1.5, 0, 0, 0, 0]", "[0, 0, 2.5, 0, 0]"] {
             let data = OF_ROS.split("data: ").nth(2).unwrap().lines().next().unwrap();
             let error = with(data, coefficients);

@@ -1,9 +1,10 @@
-//! Changes a camera's file without changing the rest of it: comments, and fields of other programs.
+//! Updates a camera file and keeps the rest of it: comments, and fields of other programs.
 //!
-//! A section is a line that starts with its name, and the indented lines after it, as every tool writes `camera_info`.
+//! A section is a line that starts with its name, and the indented lines after it. All tools write `camera_info` in
+//! this form.
 
-/// `existing` with each of the `known` sections replaced by that of the same name in `sections`, or removed if there is
-/// none; missing ones are added at the end.
+/// Replaces each of the `known` sections of `existing` by the section of the same name in `sections`, or removes it if
+/// there is none. Missing sections are added at the end.
 pub(crate) fn merged(existing: &str, known: &[&str], sections: &[(&str, String)]) -> String {
     let mut text = String::new();
     let mut written: Vec<&str> = Vec::new();

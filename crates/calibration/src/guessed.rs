@@ -1,4 +1,4 @@
-//! An uncalibrated camera over a sheet.
+//! An uncalibrated camera above a sheet.
 
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
@@ -9,21 +9,21 @@ use crate::table::{focal_from_sheet, homography_rms_px};
 
 /// Largest relative error of a focal length from the sheet's perspective.
 const MAX_FOCAL_SIGMA: f64 = 0.1;
-/// Usual angle of view of webcams and phones.
+/// Assumed horizontal angle of view, in degrees: typical of webcams and phones.
 pub const ASSUMED_VIEW_DEG: f64 = 60.0;
-/// Largest error of corners that a lens without distortion explains; more is distortion.
+/// Largest reprojection error that a lens without distortion explains; a larger one is due to distortion.
 const MAX_STRAIGHT_PX: f64 = 1.0;
 
-/// Source of the focal length.
+/// The source of the focal length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FocalSource {
-    /// The camera's file.
+    /// The camera file.
     File,
-    /// The user.
+    /// A value given by the user.
     Given,
-    /// The sheet's perspective; its error as a share.
+    /// The sheet's perspective; the value is the relative error.
     Perspective(f64),
-    /// A usual angle of view.
+    /// The assumed angle of view.
     Guess,
 }
 
@@ -39,8 +39,8 @@ impl FocalSource {
     }
 }
 
-/// A camera without a file: its axis at the centre, no distortion, and a focal length from any available source; `None`
-/// for an impossible one.
+/// A camera without a file: the axis at the centre, no distortion, and a focal length from the best available source;
+/// `None` if that focal length is impossible.
 pub fn guess_camera(
     size: (u32, u32),
     board: &Board,
@@ -65,7 +65,7 @@ pub fn guess_camera(
     Some((camera, source))
 }
 
-/// Distortion of the sheet's lines by the lens, in pixels RMS; `None` if a lens without distortion explains the
+/// RMS distortion of the sheet's lines by the lens, in pixels; `None` if a lens without distortion explains the
 /// corners.
 pub fn bent_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     homography_rms_px(board, corners).filter(|rms| *rms > MAX_STRAIGHT_PX)

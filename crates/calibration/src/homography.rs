@@ -1,9 +1,9 @@
-//! The plane's picture: `pixel ~ H (x, y, 1)`.
+//! The homography from a plane to its picture: `pixel ~ H (x, y, 1)`.
 
 use nalgebra::{DMatrix, Matrix3, Point2, Vector3};
 
-/// The homography from points of a plane to pixels, by least squares of the normalised linear equations; `None` if they
-/// do not determine it: fewer than four points, or points on a line.
+/// The homography from points of a plane to pixels, by least squares of the normalised linear equations. `None` if the
+/// points do not determine it: fewer than four, or all on a line.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, algorithm 4.2.
@@ -28,14 +28,14 @@ pub(crate) fn fit(places: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>>
     let eigen = normal.symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // Two undetermined directions: the points lie on a line.
+    // A second undetermined direction: the points lie on a line.
     if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
         return None;
     }
     let h = eigen.eigenvectors.column(order[0]);
     let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
     let matrix = to.try_inverse()? * normalised * from;
-    // The points' centre is in front of the camera.
+    // The sign places the points' centre in front of the camera.
     let middle = from.try_inverse()? * Vector3::z();
     Some(matrix * (1.0 / (matrix * middle).z))
 }
@@ -46,7 +46,7 @@ pub(crate) fn apply(homography: &Matrix3<f64>, place: &Point2<f64>) -> Point2<f6
     Point2::new(h.x / h.z, h.y / h.z)
 }
 
-/// Moves the mean to the origin and the mean distance to √2.
+/// The transform that moves the mean to the origin and makes the mean distance √2.
 fn normaliser<'a>(points: impl Iterator<Item = &'a Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
     let count = points.clone().count() as f64;
     let mean = points.clone().map(|point| point.coords).sum::<nalgebra::Vector2<f64>>() / count;

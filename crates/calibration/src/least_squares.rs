@@ -1,16 +1,17 @@
-//! Least squares over parameters that all pictures share and six more for each picture (its pose).
+//! Least squares over shared parameters and six parameters of each picture (its pose).
 //!
-//! Legend: `s` shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the
-//! gradients `Jᵀ r` of residuals `r` (found minus expected). Pictures are coupled only by `s`, so that their own steps
-//! are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`. The matrix on the left is also the pictures' information
-//! about `s`; its inverse, times the residuals' variance, is the covariance of `s`.
+//! Legend: `s` the shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the
+//! gradients `g = Jᵀ r` of residuals `r` (found minus expected). Pictures are coupled only by `s`, so their own steps
+//! are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`. The matrix on the left is also the information of the
+//! pictures about `s`; its inverse, times the variance of the residuals, is the covariance of `s`.
 //!
 //! # Source
-//! Levenberg–Marquardt with the diagonal scaled (Marquardt 1963); Schur complement as in bundle adjustment (Triggs et al. 2000, section 6).
+//! Levenberg–Marquardt with a scaled diagonal (Marquardt 1963); Schur complement as in bundle adjustment (Triggs et al.
+//! 2000, section 6).
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
-/// Normal equations of one picture.
+/// The normal equations of one picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Block<const S: usize> {
     pub(crate) shared: SMatrix<f64, S, S>,
@@ -18,7 +19,7 @@ pub(crate) struct Block<const S: usize> {
     pub(crate) mixed: SMatrix<f64, S, 6>,
     pub(crate) own: Matrix6<f64>,
     pub(crate) own_gradient: Vector6<f64>,
-    /// Sum of squares, with reduced weight beyond a robust bound.
+    /// Sum of squares; residuals beyond a robust bound count less.
     pub(crate) cost: f64,
 }
 
@@ -34,7 +35,7 @@ impl<const S: usize> Block<S> {
         }
     }
 
-    /// Adds residuals with their derivatives, each square weighted.
+    /// Adds residuals with their derivatives. `weight` applies to the squares.
     pub(crate) fn add<const R: usize>(
         &mut self,
         residual: &SVector<f64, R>,
@@ -52,13 +53,13 @@ impl<const S: usize> Block<S> {
     }
 }
 
-/// A sum of squares of parameters.
+/// A least-squares problem at its current parameters.
 pub(crate) trait Problem<const S: usize>: Clone {
-    /// The normal equations of each picture at these parameters; `None` for impossible parameters.
+    /// The normal equations of each picture at the current parameters; `None` if these are impossible.
     fn blocks(&self) -> Option<Vec<Block<S>>>;
     /// The parameters after a step.
     fn stepped(&self, shared: &SVector<f64, S>, own: &[Vector6<f64>]) -> Self;
-    /// Shared parameters that are fixed.
+    /// Whether each shared parameter is fixed.
     fn fixed(&self) -> [bool; S] {
         [false; S]
     }
@@ -69,17 +70,17 @@ pub(crate) trait Problem<const S: usize>: Clone {
 pub(crate) struct Minimum<P, const S: usize> {
     pub(crate) at: P,
     pub(crate) cost: f64,
-    /// The information about the shared parameters; rows of fixed ones are those of the identity matrix.
+    /// The information about the shared parameters; the rows of fixed ones are those of the identity matrix.
     pub(crate) information: SMatrix<f64, S, S>,
 }
 
 const MAX_STEPS: usize = 100;
-/// Stopping criterion: a decrease of the cost below this share.
+/// Relative decrease of the cost below which the minimisation ends.
 const MIN_DECREASE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-3;
 const MAX_DAMPING: f64 = 1e12;
 
-/// Minimises from the problem's present state; `None` if that state is impossible.
+/// Minimises from the problem's current parameters; `None` if these are impossible.
 pub(crate) fn minimise<P: Problem<S>, const S: usize>(start: P) -> Option<Minimum<P, S>> {
     let cost_of = |blocks: &[Block<S>]| blocks.iter().map(|block| block.cost).sum::<f64>();
     let mut at = start;
@@ -109,7 +110,7 @@ pub(crate) fn minimise<P: Problem<S>, const S: usize>(start: P) -> Option<Minimu
     cost.is_finite().then_some(Minimum { at, cost, information })
 }
 
-/// The system of the shared parameters alone.
+/// The equations of the shared parameters, without those of the pictures.
 fn reduced<const S: usize>(
     blocks: &[Block<S>],
     fixed: &[bool; S],
@@ -163,7 +164,7 @@ fn damped(own: &Matrix6<f64>, damping: f64) -> Matrix6<f64> {
 mod tests {
     use super::*;
 
-    /// y = a + b x + c_k in picture k, where c has a prior: a line through points, by hand.
+    /// y = a + b x + c_k in picture k, where c_k has a prior: a line through points, solved by hand.
     #[derive(Debug, Clone)]
     struct Line {
         shared: SVector<f64, 2>,
@@ -182,7 +183,7 @@ mod tests {
                     by_own[0] = 1.0;
                     block.add(&residual, &SMatrix::<f64, 1, 2>::new(1.0, *x), &by_own, 1.0);
                 }
-                // The prior, and a small value for parameters without influence.
+                // The prior; and a small value for parameters without influence.
                 block.own += Matrix6::identity();
                 block.own_gradient[0] += own;
                 block.cost += own * own;
@@ -201,12 +202,12 @@ mod tests {
         let start = Line { shared: SVector::<f64, 2>::zeros(), own: vec![0.0; 2] };
         let minimum = minimise(start).unwrap();
         assert!((minimum.at.shared - SVector::<f64, 2>::new(1.0, 2.0)).norm() < 1e-6, "{}", minimum.at.shared);
-        // The means of the residuals about y = 1 + 2 x are ± 0.2 / 3; with the prior, three quarters of it.
+        // The means of the residuals about y = 1 + 2 x are ± 0.2 / 3; with the prior, three quarters of that.
         assert!((minimum.at.own[0] - 0.05).abs() < 1e-6, "{:?}", minimum.at.own);
-        // Of b: the sum of squares about the mean, twice 2, and the part of the means that the offsets leave, 6 - 2 · 9
-        // / 4.
+        // Information about a: the number of points, 6, minus the part that the offsets explain, 3² / (3 + 1) in each
+        // picture.
         assert!((minimum.information[(0, 0)] - 1.5).abs() < 1e-9, "{}", minimum.information);
-        // 10 - 2 · 9 / 4.
+        // Information about b: the sum of x², 10, minus the same part.
         assert!((minimum.information[(1, 1)] - 5.5).abs() < 1e-9, "{}", minimum.information);
     }
 }

@@ -1,16 +1,16 @@
-//! Calibrated cameras: their calibration and their files.
+//! Calibration of cameras and their files.
 //!
 //! ```text
-//! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its place on the board
+//! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its position on the board
 //!   ├─ PictureTaker        a camera's frames        ─ selection of frames as pictures
 //!   ├─ calibrate           many pictures            ─ focal length, centre, lens, with errors and advice
-//!   ├─ locate_sheet        one, on the table        ─ where the camera is over the table
-//!   └─ calibrate_hand_eye  many, with robot poses   ─ where the camera is on the robot, or beside it
-//! CalibratedCamera: ROS's camera_info YAML, `table:` and `hand_eye:` beside it ─ PosedCamera, workspace ─ plan view
+//!   ├─ locate_sheet        one, on the table        ─ the camera's pose above the table
+//!   └─ calibrate_hand_eye  many, with robot poses   ─ the camera's pose on the robot's hand, or beside the robot
+//! CalibratedCamera: ROS's camera_info YAML, with `table:` and `hand_eye:` ─ PosedCamera, workspace ─ plan view
 //! ```
-//! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added
-//! when such a file is read and subtracted when it is written. The board's origin is the outer corner of its lower left
-//! dark square, x right, y up, z out of the sheet. Lengths in metres, `z` up from the table.
+//! **Frames.** ROS and OpenCV place the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is
+//! added when such a file is read and subtracted when it is written. The board's origin is the outer corner of its
+//! lower left dark square, x right, y up, z out of the sheet. Lengths are in metres; `z` points up from the table.
 //!
 //! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Files and clocks are in `cli`.
 //!

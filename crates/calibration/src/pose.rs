@@ -1,4 +1,4 @@
-//! The board's pose in front of a camera with known intrinsics.
+//! The board's pose relative to a camera with known intrinsics.
 
 use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point2, Point3, Rotation3, SMatrix, UnitQuaternion, Vector6};
 use sdg_geometry::PinholeCamera;
@@ -12,11 +12,11 @@ use crate::projection::{by_twist, motion, off, project};
 /// The board's pose in one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardPose {
-    /// From the board's frame to the optical frame, in metres.
+    /// Transform from the board's frame to the optical frame, in metres.
     pub camera_from_board: Isometry3<f64>,
-    /// Root of the mean squared distance between corners and their projections.
+    /// Root of the mean squared distance between corners and their projections, in pixels.
     pub rms_px: f64,
-    /// Covariance of a small twist (translation, turn) in the optical frame that is applied after the pose.
+    /// Covariance of a small twist (translation, rotation) in the optical frame that is applied after the pose.
     pub covariance: Matrix6<f64>,
 }
 
@@ -35,11 +35,11 @@ pub fn board_pose(camera: &PinholeCamera, board: &Board, corners: &[SeenCorner])
     Some(BoardPose { camera_from_board: minimum.at.camera_from_board, rms_px, covariance })
 }
 
-/// The pose whose first two axes and translation come from a homography to points at depth 1.
+/// The pose from a homography to points at depth 1, which determines the first two axes and the translation.
 pub(crate) fn from_homography(homography: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let [x, y, t] = [0, 1, 2].map(|k| homography.column(k).into_owned());
     let scale = 2.0 / (x.norm() + y.norm());
-    // The board's centre is in front of the camera, which `homography::fit` ensures.
+    // The sign is correct: `homography::fit` places the board's centre in front of the camera.
     let (x, y, t) = (x * scale, y * scale, t * scale);
     let matrix = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     let svd = matrix.svd(true, true);
@@ -68,7 +68,7 @@ impl Problem<6> for Alone<'_> {
             let by_pose: Matrix2x6<f64> = projected.by_point * by_twist(&p);
             block.add(&off(&projected.pixel, &seen.pixel), &by_pose, &SMatrix::zeros(), 1.0);
         }
-        // The picture has only the shared parameters.
+        // All parameters are shared.
         block.own = Matrix6::identity();
         Some(vec![block])
     }
@@ -78,7 +78,7 @@ impl Problem<6> for Alone<'_> {
     }
 }
 
-/// Pixels of a pinhole picture and points of the board, in the form that a homography needs.
+/// Points of the board and pixels of a pinhole picture, as a homography needs them.
 pub(crate) fn places(board: &Board, corners: &[SeenCorner]) -> Vec<(Point2<f64>, Point2<f64>)> {
     corners.iter().map(|seen| (board.corner(seen.corner).xy(), seen.pixel)).collect()
 }

@@ -1,4 +1,4 @@
-//! From a point in front of the camera to its pixel, with derivatives.
+//! Projects a point in front of the camera to its pixel, with derivatives.
 //!
 //! Legend: `p` a point in the camera's frame, `(x, y) = (p.x, p.y) / p.z`, `(x', y')` its position through the lens
 //! (geometry's `PlumbBob`); `u = fx x' + cx`, `v = fy y' + cy`. Intrinsics are in the order fx, fy, cx, cy, k1, k2, p1,
@@ -7,7 +7,7 @@
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x6, Point2, Point3, SMatrix, SVector, Vector2, Vector3};
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-/// Number of a camera's intrinsics: two focal lengths, the principal point, five of the lens.
+/// Number of intrinsics of a camera: two focal lengths, the principal point and five lens coefficients.
 pub(crate) const NUM_INTRINSICS: usize = 9;
 
 /// A pixel and its derivatives.
@@ -18,8 +18,8 @@ pub(crate) struct Projected {
     pub(crate) by_point: Matrix2x3<f64>,
 }
 
-/// Projects; `None` at or behind the camera. Beyond the radius at which the lens's polynomial turns back it continues,
-/// so that an optimiser can return from there.
+/// Projects a point; `None` at or behind the camera. Beyond the radius at which the lens's polynomial decreases again,
+/// the polynomial is evaluated anyway: an optimiser must be able to return from there.
 pub(crate) fn project(camera: &PinholeCamera, p: &Point3<f64>) -> Option<Projected> {
     if p.z <= f64::EPSILON {
         return None;
@@ -69,7 +69,7 @@ pub(crate) fn stepped(camera: &PinholeCamera, delta: &SVector<f64, NUM_INTRINSIC
     }
 }
 
-/// Derivative of a point by a small twist `(t, ω)` that is applied last: `δp = t + ω × p`.
+/// The derivative of a point by a small twist `(t, ω)` that is applied last: `δp = t + ω × p`.
 pub(crate) fn by_twist(p: &Point3<f64>) -> Matrix3x6<f64> {
     let mut matrix = Matrix3x6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
@@ -83,7 +83,7 @@ pub(crate) fn motion(twist: &nalgebra::Vector6<f64>) -> nalgebra::Isometry3<f64>
     nalgebra::Isometry3::new(part(0), part(3))
 }
 
-/// A difference of pixels as a vector.
+/// The vector from the expected pixel to the found one.
 pub(crate) fn off(found: &Point2<f64>, expected: &Point2<f64>) -> Vector2<f64> {
     found - expected
 }
@@ -103,8 +103,7 @@ mod tests {
         cy: 244.0,
         lens: PlumbBob { k1: -0.28, k2: 0.11, p1: 0.0013, p2: -0.0007, k3: -0.02 },
     };
-    /// Steps of central differences, and their tolerance from the derivative, in pixels per unit: the third
-    /// derivative's share.
+    /// Step of the central differences, and their tolerance in pixels per unit, which covers the third derivative.
     const STEP: f64 = 1e-6;
     const MAX_OFF: f64 = 1e-4;
 

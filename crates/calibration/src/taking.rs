@@ -1,28 +1,29 @@
-//! Selects frames of a camera for the calibration: the board is at rest in them, in a view unlike all before.
+//! Selects frames of a camera for the calibration: the board is at rest in them, and its view differs from all previous
+//! ones.
 
 use nalgebra::Vector2;
 use sdg_geometry::median;
 
 use crate::detection::SeenCorner;
 
-/// Largest movement of the corners of a board at rest, as a share of the picture's diagonal. Chosen by hand: 1.6 pixels
-/// of 640 × 480.
+/// Largest movement of the corners of a board at rest, as a fraction of the picture's diagonal. Chosen by hand: 1.6
+/// pixels of 640 × 480.
 const STILL_SHARE: f64 = 0.002;
-/// Number of successive frames at rest, so that no picture is blurred.
+/// Number of successive frames at rest that are required, so that no picture is blurred.
 const STILL_FRAMES: u32 = 4;
-/// Minimum distance of the corners from those of every other view, for a new view. Chosen by hand: 48 pixels of 640 ×
-/// 480, a tenth of the board's width if it fills the picture.
+/// Minimum distance of the corners from those of every other view for a new view, as a fraction of the diagonal. Chosen
+/// by hand: 48 pixels of 640 × 480, a tenth of the board's width if it fills the picture.
 const NEW_PLACE_SHARE: f64 = 0.06;
-/// The same for the corners relative to their centre: another tilt or size at the same place. Chosen by hand: 10 pixels
-/// of 640 × 480, the effect of a tilt by 25 degrees on a board that fills half of the picture.
+/// Like [`NEW_PLACE_SHARE`], for the corners relative to their centre: another tilt or size at the same place. Chosen
+/// by hand: 10 pixels of 640 × 480, the effect of a tilt by 25 degrees on a board that fills half of the picture.
 const NEW_SHAPE_SHARE: f64 = 0.0125;
 
 /// The state of the board in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// It moves.
+    /// The board moves.
     Moving,
-    /// At rest, as in a picture that was taken.
+    /// At rest, in a view that was taken already.
     Known,
     /// At rest, in a new view: to be taken.
     New,
@@ -34,24 +35,24 @@ pub struct PictureTaker {
     diagonal_px: f64,
     still_frames: u32,
     taken: Vec<Vec<SeenCorner>>,
-    /// The corners at the start of the rest, and the number of frames since.
+    /// The corners at the beginning of the rest, and the number of frames since then.
     still: Option<(Vec<SeenCorner>, u32)>,
 }
 
 impl PictureTaker {
-    /// For successive pictures of this size.
+    /// Creates a selector for successive frames of this size.
     pub fn new(width: u32, height: u32) -> Self {
         let diagonal_px = f64::from(width).hypot(f64::from(height));
         Self { diagonal_px, still_frames: STILL_FRAMES, ..Self::default() }
     }
 
-    /// For pictures taken one by one: the board is at rest in each.
+    /// Switches to pictures that are taken one by one, in each of which the board is at rest.
     #[must_use]
     pub fn of_single_pictures(self) -> Self {
         Self { still_frames: 1, ..self }
     }
 
-    /// Processes the next frame, with these corners.
+    /// Processes the next frame, which shows these corners.
     pub fn look(&mut self, corners: &[SeenCorner]) -> Sight {
         let is_still = |from: &[SeenCorner]| {
             distances_px(from, corners).is_some_and(|[place, _]| place <= STILL_SHARE * self.diagonal_px)
@@ -77,24 +78,24 @@ impl PictureTaker {
         if self.taken.iter().any(is_known) { Sight::Known } else { Sight::New }
     }
 
-    /// The next frame does not show the board.
+    /// Processes a next frame without the board.
     pub fn lose(&mut self) {
         self.still = None;
     }
 
-    /// Keeps the corners of a picture that was taken.
+    /// Records the corners of a picture that was taken.
     pub fn keep(&mut self, corners: Vec<SeenCorner>) {
         self.taken.push(corners);
     }
 
-    /// The corners of all pictures taken, in order.
+    /// The corners of all taken pictures, in order.
     pub fn taken(&self) -> &[Vec<SeenCorner>] {
         &self.taken
     }
 }
 
-/// Distance of the corners that both show, and their distance relative to their own centres, as medians; `None` without
-/// common corners.
+/// Medians of two distances over the common corners, in pixels: between the corners, and between the corners relative
+/// to their centres. `None` without common corners.
 fn distances_px(one: &[SeenCorner], other: &[SeenCorner]) -> Option<[f64; 2]> {
     let apart = one.iter().filter_map(|seen| {
         let same = other.iter().find(|same| same.corner == seen.corner)?;
@@ -111,7 +112,7 @@ mod tests {
     use super::*;
     use nalgebra::Point2;
 
-    /// Corners 0 to 11 of a row, from this place on.
+    /// Corners of a row, such as 0 to 11, starting at this position.
     fn row(x: f64, y: f64, corners: std::ops::Range<u32>) -> Vec<SeenCorner> {
         let corner = |k: u32| SeenCorner { corner: [k, 0], pixel: Point2::new(x + 20.0 * f64::from(k), y) };
         corners.map(corner).collect()
@@ -127,7 +128,7 @@ mod tests {
         assert_eq!(sights, [Sight::Moving, Sight::Moving, Sight::New]);
         taker.keep(resting.clone());
         assert_eq!(taker.look(&resting), Sight::Known);
-        // At less than 48 pixels it is the same view.
+        // Within 48 pixels the view is the same.
         let sights = [(); 4].map(|()| taker.look(&row(115.5, 90.0, 0..12)));
         assert_eq!(sights[3], Sight::Known);
         let sights = [(); 4].map(|()| taker.look(&row(115.5, 100.0, 0..12)));
@@ -144,8 +145,8 @@ mod tests {
             (0..12).map(corner).collect()
         };
         taker.keep(sized(30.0));
-        // The corners are 0.5 to 5.5 steps from their centre, with a median of 3: 2 pixels per step are 6, 4 are 12,
-        // and 10 are required.
+        // The corners are 0.5 to 5.5 steps from their centre, with a median of 3: 2 pixels per step change this by 6
+        // pixels, 4 by 12; 10 are required.
         assert_eq!(taker.look(&sized(32.0)), Sight::Known);
         assert_eq!(taker.look(&sized(34.0)), Sight::New);
     }

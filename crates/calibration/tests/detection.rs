@@ -1,4 +1,4 @@
-//! Boards in rendered pictures: the found corners, their accuracy, and the errors if none are found.
+//! Boards in rendered pictures: the found corners, their accuracy, and the errors if no board is found.
 
 use crate::rendering::{Exposure, Random, camera_from_board, render, render_with};
 use crate::textures::{TEXTURES, picture};
@@ -16,17 +16,17 @@ const WIDE: PinholeCamera = PinholeCamera {
     cy: 236.0,
     lens: PlumbBob { k1: -0.25, k2: 0.08, p1: 0.001, p2: -0.0008, k3: 0.0 },
 };
-/// Bound on the RMS error of corners in ordinary pictures, twice the 0.03 px that the crate documents.
+/// Largest RMS error of corners in ordinary pictures: twice the 0.03 px that the crate documents.
 const MAX_RMS_PX: f64 = 0.06;
 
-/// Pictures of each texture. With dots alone a board is found in 18 of these 160.
+/// Number of pictures of each texture. A search for dots alone finds a board in 18 of these 160 pictures.
 const NUM_TEXTURES: u64 = 32;
 
 fn board() -> Board {
     Board::new(9, 6, 0.025).unwrap()
 }
 
-/// RMS distance from the truth; fails if a corner is confused with another.
+/// RMS distance from the ground truth; fails if a corner is confused with another.
 fn rms_px(corners: &[SeenCorner], board: &Board, camera: &PinholeCamera, pose: &Isometry3<f64>) -> f64 {
     let squares = corners.iter().map(|seen| {
         let off = (camera.project(&(pose * board.corner(seen.corner))).unwrap() - seen.pixel).norm();
@@ -133,7 +133,7 @@ fn what_is_no_board_is_told_by_what_is_missing() {
     assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
 }
 
-/// Too little of it is visible; parts of a grid may be.
+/// Too little of the board is visible; parts of a grid may be found.
 fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
     use CalibrationError::{BoardNotFound, BoardUnclear, OtherCheckerboard};
     matches!(found, Err(BoardNotFound { .. } | BoardUnclear { .. } | OtherCheckerboard { .. }))
@@ -166,7 +166,7 @@ fn a_board_without_dots_is_known_where_it_is_whole() {
 #[test]
 fn a_board_among_other_squares_and_partly_covered_is_found() {
     let board = board();
-    // Squares of random colour all around, and a dark disc over the board, like a thumb.
+    // Squares of random colour all around, and a dark disc on the board, like a thumb.
     let printed = |place: &Point2<f64>| {
         let on_sheet = (-1.0..10.0).contains(&place.x) && (-1.0..7.0).contains(&place.y);
         let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
@@ -181,12 +181,12 @@ fn a_board_among_other_squares_and_partly_covered_is_found() {
         let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.55, tilts);
         let picture = render_with(&printed, &board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(k as u64));
         let corners = find_board(&picture, &board).unwrap();
-        // Corners next to the disc's border are shifted towards it.
+        // Corners near the disc's border are shifted towards it.
         let rms = rms_px(&corners, &board, &WIDE, &pose);
         println!("clutter {k}: {} corners, {rms:.4} px", corners.len());
         assert!((34..40).contains(&corners.len()) && rms < 0.1, "{k}: {} corners, {rms:.3} px", corners.len());
     }
-    // Without the board nothing is mistaken for it.
+    // Without the board, no other pattern is taken for it.
     let floor = |place: &Point2<f64>| {
         let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
         Random(cell(place.x).wrapping_mul(1009).wrapping_add(cell(place.y))).unit() < 0.5

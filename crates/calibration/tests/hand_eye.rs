@@ -1,8 +1,8 @@
-//! The camera on the robot and beside it, from simulated robots, compared with OpenCV's `calibrateHandEye` on the same
-//! numbers.
+//! A camera on the robot's hand and beside the robot, with simulated robots, compared with OpenCV's `calibrateHandEye`
+//! on the same numbers.
 //!
-//! OpenCV's figures are in tests/golden/opencv/hand_eye.json, made by `write_trials` below and hand_eye.py in that
-//! folder.
+//! OpenCV's results are in tests/golden/opencv/hand_eye.json. They are made by `write_trials` below and hand_eye.py in
+//! that folder.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub const CAMERA: PinholeCamera = PinholeCamera {
     cy: 238.0,
     lens: PlumbBob { k1: -0.1, k2: 0.04, p1: 0.0005, p2: -0.0004, k3: 0.0 },
 };
-/// Bounds of position and angle with exact robot poses; docs/calibration.md has the figures.
+/// Largest errors of position and angle with exact robot poses; docs/calibration.md has the measured ones.
 const MAX_ERROR_M: f64 = 0.0005;
 const MAX_ERROR_DEG: f64 = 0.1;
 /// Standard deviations of the simulated noise.
@@ -107,14 +107,14 @@ fn solve(mount: Mount, views: &[HandEyeView]) -> Result<HandEye, CalibrationErro
     calibrate_hand_eye(&CAMERA, &board(), mount, views)
 }
 
-/// Millimetres and degrees.
+/// Errors in millimetres and degrees.
 pub fn errors(found: &Isometry3<f64>, mount: Mount) -> [f64; 2] {
     let truth = truth(mount);
     let off = 1000.0 * (found.translation.vector - truth.translation.vector).norm();
     [off, found.rotation.angle_to(&truth.rotation).to_degrees()]
 }
 
-/// Median and worst.
+/// The median and the largest value.
 fn summary(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     [values[values.len() / 2], values[values.len() - 1]]
@@ -165,7 +165,10 @@ fn with_noisy_robot_poses_we_are_nearer_than_every_method_of_opencv() {
         let told = 1000.0 * squares(&mut found.iter().map(|found| found.sigma_m));
         let ratio = squares(&mut all.iter().map(|errors| errors[0])) / told;
         let noise = summary(found.iter().map(|found| found.robot_sigma.unwrap_or_default()[1].to_degrees()).collect());
-        println!("  errors over told {ratio:.2}; the robot's noise estimated at {:.3} deg (median)", noise[0]);
+        println!(
+            "  errors over estimated errors {ratio:.2}; the robot's noise estimated at {:.3} deg (median)",
+            noise[0]
+        );
         assert!((1.0 / 1.4..1.4).contains(&ratio), "{ratio}");
         assert!((0.5 * ROBOT_SIGMA_DEG..2.0 * ROBOT_SIGMA_DEG).contains(&noise[0]));
     }
@@ -213,12 +216,12 @@ fn a_pose_that_is_wrong_shows_in_its_picture_and_in_the_spread() {
     let mut views = views(Mount::Hand, 7, &EXACT_ROBOT);
     let good = solve(Mount::Hand, &views).unwrap();
     assert!(good.robot_sigma.is_none() && good.spread.iter().all(|[metres, _]| *metres < 0.0005), "{:?}", good.spread);
-    // 5 mm: the arm was still moving.
+    // An error of 5 mm, as of an arm that was still moving.
     views[6].base_from_flange.translation.x += 0.005;
     let found = solve(Mount::Hand, &views).unwrap();
     let most = |of: &dyn Fn(usize) -> f64| (0..NUM_POSES).max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap();
     assert_eq!(most(&|k| found.pictures_rms_px[k]), 6);
-    // Its error is attributed to the robot in all pictures: the spread shows that the result depends on few of them.
+    // The error is attributed to the robot in all pictures. The spread shows that the result depends on few of them.
     let widest = |found: &HandEye| found.spread.iter().map(|[metres, _]| *metres).fold(0.0, f64::max);
     println!("spread {:.3} mm, before {:.3} mm", 1000.0 * widest(&found), 1000.0 * widest(&good));
     assert!(widest(&found) > 3.0 * widest(&good) && found.robot_sigma.is_some());
@@ -229,7 +232,7 @@ fn poses_that_turn_about_one_axis_are_an_error_that_names_the_others() {
     let mut random = Random(3);
     let exact = Noise { corner_px: 0.1, robot_m: 0.0, robot_deg: 0.0 };
     let first = view(Mount::Hand, &mut random, &exact, 0.0);
-    // Without tilts only the turns about the optical axis remain, which is nearly the flange's z.
+    // Without tilts, only rotations about the optical axis remain, which is nearly the flange's z.
     let mut alike = vec![first.clone()];
     alike.extend((0..8).map(|_| view(Mount::Hand, &mut random, &exact, 0.0)));
     let error = solve(Mount::Hand, &alike).unwrap_err();
@@ -262,7 +265,7 @@ fn mistaken_readings_of_the_poses_are_named() {
     let millimetres =
         |pose: &Isometry3<f64>| Isometry3::from_parts((pose.translation.vector * 1000.0).into(), pose.rotation);
     assert!(with(&millimetres, Mount::Hand).contains("millimetres"));
-    // Each with another picture's pose.
+    // Each picture has another picture's pose.
     let mut mixed = views.clone();
     for k in 0..NUM_POSES {
         mixed[k].base_from_flange = views[(k + 1) % NUM_POSES].base_from_flange;

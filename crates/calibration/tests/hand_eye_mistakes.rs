@@ -1,4 +1,4 @@
-//! Wrong robot poses and boards of another size: the named error.
+//! The errors for wrong robot poses and for boards of another size.
 
 use crate::hand_eye::{CAMERA, EXACT_ROBOT, NOISY_ROBOT, NUM_POSES, Noise, board, views};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -21,7 +21,7 @@ fn solve(mount: Mount, views: &[HandEyeView]) -> Result<HandEye, CalibrationErro
     calibrate_hand_eye(&CAMERA, &board(), mount, views)
 }
 
-/// The given size of the board is `told` times the true one.
+/// Calibrates with a given size of the board that is `told` times the true one.
 fn solve_told(mount: Mount, views: &[HandEyeView], told: f64) -> Result<HandEye, CalibrationError> {
     let board = Board::new(9, 6, board().square_m() * told).unwrap();
     calibrate_hand_eye(&CAMERA, &board, mount, views)
@@ -33,7 +33,7 @@ fn refusal(mount: Mount, views: &[HandEyeView]) -> String {
     text
 }
 
-/// The rotation from turns about x, y and z, multiplied in this order.
+/// The rotation from angles about x, y and z, multiplied in this order.
 fn product(order: [usize; 3], about: [f64; 3]) -> UnitQuaternion<f64> {
     order.iter().fold(UnitQuaternion::identity(), |rotation, axis| {
         let mut vector = Vector3::zeros();
@@ -42,7 +42,7 @@ fn product(order: [usize; 3], about: [f64; 3]) -> UnitQuaternion<f64> {
     })
 }
 
-/// Turns about x, y and z as robots report them: Rz·Ry·Rx.
+/// Angles about x, y and z as robots report them: Rz·Ry·Rx.
 fn roll_pitch_yaw(pose: &Isometry3<f64>) -> [f64; 3] {
     pose.rotation.euler_angles().into()
 }
@@ -75,7 +75,7 @@ fn a_board_of_the_told_size_is_not_blamed_where_pictures_are_few() {
             assert!(solve(mount, &views[..num]).is_ok(), "{mount:?}, {num} pictures, {seed}");
         }
     }
-    // A robot whose errors have another ratio than assumed.
+    // A robot whose errors have another ratio than the assumed one.
     let turned_only = Noise { corner_px: 0.3, robot_m: 0.0, robot_deg: 0.1 };
     for seed in 0..30 {
         let views = views(Mount::Hand, 7000 + seed, &turned_only);
@@ -98,12 +98,12 @@ fn rotations_that_are_transposed_or_composed_in_another_order_are_named() {
                 [1, 0, 2] => "Rz(c)·Ry(a)·Rx(b)",
                 _ => "Rz(a)·Ry(c)·Rx(b)",
             };
-            assert!(text.contains(&format!("composed as {composed} of angles that mean {meant}")), "{text}");
+            assert!(text.contains(&format!("composed as {composed} from angles meant for {meant}")), "{text}");
         }
         let of_vector = |p: &Isometry3<f64>| with_rotation(p, product([2, 1, 0], p.rotation.scaled_axis().into()));
-        assert!(refusal(mount, &changed(&views, &of_vector)).contains("mean the rotation vector (c, b, a)"));
+        assert!(refusal(mount, &changed(&views, &of_vector)).contains("meant for the rotation vector (c, b, a)"));
         let tiny = |p: &Isometry3<f64>| with_rotation(p, product([2, 1, 0], roll_pitch_yaw(p).map(f64::to_radians)));
-        assert!(refusal(mount, &changed(&views, &tiny)).contains("radians that were taken for degrees"));
+        assert!(refusal(mount, &changed(&views, &tiny)).contains("radians that were read as degrees"));
         let transposed = |p: &Isometry3<f64>| with_rotation(p, p.rotation.inverse());
         assert!(refusal(mount, &changed(&views, &transposed)).contains("rotations seem to be transposed (flange"));
         let shifts = |p: &Isometry3<f64>| Isometry3::from_parts(p.inverse().translation, p.rotation);
@@ -116,16 +116,16 @@ fn rotations_that_are_transposed_or_composed_in_another_order_are_named() {
 #[test]
 fn no_reading_is_proposed_that_leaves_many_pixels() {
     let views = views(Mount::Hand, 5, &EXACT_ROBOT);
-    // Degrees taken for radians cannot be reversed, and a mirrored axis is not among the tried readings.
+    // Degrees that were read as radians cannot be recovered, and a mirrored axis is not among the readings.
     let wound = |p: &Isometry3<f64>| with_rotation(p, product([2, 1, 0], roll_pitch_yaw(p).map(f64::to_degrees)));
     let text = refusal(Mount::Hand, &changed(&views, &wound));
-    assert!(text.contains("turns by other angles than the board") && !text.contains("which leaves"), "{text}");
+    assert!(text.contains("rotates by other angles than the board") && !text.contains("with this reading"), "{text}");
     let mirrored = |p: &Isometry3<f64>| {
         let [x, y, z]: [f64; 3] = p.translation.vector.into();
         Isometry3::from_parts(Vector3::new(x, -y, z).into(), p.rotation)
     };
     let text = refusal(Mount::Hand, &changed(&views, &mirrored));
-    assert!(text.contains("each picture is listed with its own pose") && !text.contains("which leaves"), "{text}");
+    assert!(text.contains("each picture is listed with its own pose") && !text.contains("with this reading"), "{text}");
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_wrong_pose_and_two_exchanged_ones_are_named() {
             let mut views = good.clone();
             views[k].base_from_flange = good[(k + 4) % NUM_POSES].base_from_flange;
             assert_eq!(wrong(mount, &views).0, [k]);
-            // Two wrong ones.
+            // Two poses are wrong.
             views[(k + 7) % NUM_POSES].base_from_flange = good[(k + 9) % NUM_POSES].base_from_flange;
             let mut both = vec![k, (k + 7) % NUM_POSES];
             both.sort_unstable();

@@ -1,7 +1,7 @@
 //! Cameras from rendered boards, compared with OpenCV's `calibrateCamera` on the same pictures.
 //!
-//! OpenCV's figures are in tests/golden/opencv/calibration.json, made by `write_pictures` below and calibrate.py in
-//! that folder.
+//! OpenCV's results are in tests/golden/opencv/calibration.json. They are made by `write_pictures` below and
+//! calibrate.py in that folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,11 @@ use sdg_geometry::PinholeCamera;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// Bounds: the reprojection error relative to OpenCV's, and the relative error of the focal length.
+/// Largest ratio of the reprojection error to OpenCV's, and largest relative error of the focal length.
 const MAX_RMS_RATIO: f64 = 1.1;
 const MAX_FOCAL_ERROR: f64 = 0.002;
-/// Both optimisers on the same corners: they end when steps change nothing more, OpenCV after 30 steps or at 2.2e-16.
+/// Both optimisers use the same corners. They end when steps change no digits; OpenCV's ends after 30 steps or at
+/// 2.2e-16.
 const MAX_RMS_DIFFERENCE: f64 = 1e-5;
 const MAX_FOCAL_DIFFERENCE: f64 = 1e-4;
 
@@ -40,7 +41,7 @@ fn hash(pictures: &[image::GrayImage]) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Corners as a camera would show them, with noise.
+/// Corners in a camera's pictures, with noise.
 fn synthetic(camera: &PinholeCamera, sigma_px: f64, seed: u64) -> Vec<Vec<SeenCorner>> {
     let mut random = Random(seed);
     let noisy = |pose: nalgebra::Isometry3<f64>| {
@@ -85,7 +86,7 @@ fn cameras_are_found_as_exactly_as_opencv_finds_them() {
     }
 }
 
-/// The input of calibrate.py; kept beside the build.
+/// Writes the input of calibrate.py beside the build.
 #[test]
 #[ignore = "writes the pictures that OpenCV's figures are made from"]
 fn write_pictures() {
@@ -113,7 +114,7 @@ fn write_pictures() {
 fn standard_errors_are_those_that_repetition_shows() {
     const SEEDS: u64 = 400;
     const SIGMA_PX: f64 = 0.1;
-    /// The deviation of 400 normal numbers is itself uncertain by 3.5 %; four times that.
+    /// The standard deviation of 400 normal numbers is itself uncertain by 3.5 %; this allows four times that.
     const MAX_RATIO: f64 = 1.14;
     let camera = CAMERAS[0].1;
     let found: Vec<Calibration> = (0..SEEDS)
@@ -129,10 +130,10 @@ fn standard_errors_are_those_that_repetition_shows() {
     ];
     for (name, errors, k) in checks {
         let told = rms(&values(&|c| c.sigma[k]));
-        println!("{name}: errors {:.5}, told {told:.5}", rms(&errors));
+        println!("{name}: errors {:.5}, estimated {told:.5}", rms(&errors));
         assert!(
             (1.0 / MAX_RATIO..MAX_RATIO).contains(&(rms(&errors) / told)),
-            "{name}: {:.5}, told {told:.5}",
+            "{name}: {:.5}, estimated {told:.5}",
             rms(&errors)
         );
     }
@@ -153,7 +154,7 @@ fn forty_pictures_leave_the_noise_of_their_corners() {
 fn a_bad_picture_is_named_and_left_out() {
     let camera = CAMERAS[0].1;
     let mut views = synthetic(&camera, 0.05, 3);
-    // Bent like a loose sheet: 3 mm at its centre, seen from the side.
+    // A board bent like a loose sheet: by 3 mm at its centre, seen from the side.
     for seen in &mut views[4] {
         let x = f64::from(seen.corner[0]) / 4.5 - 1.0;
         seen.pixel += nalgebra::Vector2::new(3.0, 5.0) * (1.0 - x * x);
@@ -163,7 +164,7 @@ fn a_bad_picture_is_named_and_left_out() {
     assert_eq!(left_out, [4]);
     assert!(found.rms_px < 0.1 && found.pictures[4].rms_px > 0.5, "{}", found.rms_px);
     assert!((found.camera.fx / camera.fx - 1.0).abs() < MAX_FOCAL_ERROR);
-    // One corner replaced by another.
+    // One corner is replaced by another.
     let mut views = synthetic(&camera, 0.05, 3);
     views[2][7].pixel += nalgebra::Vector2::new(1.2, 0.0);
     let found = calibrate(&board(), &views, &config(&camera)).unwrap();
@@ -215,7 +216,7 @@ fn what_the_pictures_lack_is_named() {
     assert_eq!(found.advice[0], Advice::OneAxis { missing: "upwards and downwards" });
     assert!(found.advice.contains(&Advice::Empty { part: "in the lower right corner" }));
     assert!(found.advice.contains(&Advice::Few { found: 5 }));
-    // Far away.
+    // Far from the camera.
     let far: Vec<_> =
         poses.iter().map(|(_, _, tilts)| (Point2::new(320.0, 240.0).coords.into(), 0.9, *tilts)).collect();
     let found = calibrate(&board(), &views_at(&camera, &far), &config(&camera));

@@ -1,4 +1,4 @@
-//! The camera over a sheet on the table, with intrinsics and without.
+//! A camera above a sheet on the table, with intrinsics and without.
 
 use crate::rendering::cameras::WEBCAM;
 use crate::rendering::{Exposure, Random, camera_from_board, render};
@@ -8,7 +8,7 @@ use sdg_calibration::{
 };
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-/// Accuracy of the camera's position: a twentieth of a pixel at 0.6 m, tilted.
+/// Largest error of the camera's position: a twentieth of a pixel at 0.6 m, tilted.
 const MAX_PLACE_ERROR_M: f64 = 0.0005;
 
 fn board() -> Board {
@@ -47,7 +47,7 @@ fn a_rendered_sheet_tells_where_the_camera_is() {
 #[test]
 fn told_errors_are_those_that_repetition_shows() {
     const SEEDS: u64 = 400;
-    /// Deviations of 400 numbers are uncertain by 3.5 %; four times that.
+    /// The standard deviation of 400 numbers is uncertain by 3.5 %; this allows four times that.
     const MAX_RATIO: f64 = 1.14;
     let pose = camera_from_board(&board(), &WEBCAM, [640.0, 400.0], 0.6, [0.2, 0.1, 0.2]);
     let truth = pose.inverse();
@@ -62,12 +62,12 @@ fn told_errors_are_those_that_repetition_shows() {
     }
     for (name, errors, told) in [("height", heights, told[0]), ("tilt", tilts, told[1])] {
         let ratio = (errors / told).sqrt();
-        println!("{name}: errors over told {ratio:.3}");
+        println!("{name}: errors over estimated errors {ratio:.3}");
         assert!((1.0 / MAX_RATIO..MAX_RATIO).contains(&ratio), "{name}: {ratio}");
     }
 }
 
-/// As in a phone's picture: practically no distortion.
+/// A phone's camera, practically without distortion.
 const PHONE: PinholeCamera =
     PinholeCamera { lens: PlumbBob::NONE, fx: 980.0, fy: 980.0, cx: 646.0, cy: 356.0, ..WEBCAM };
 
@@ -87,9 +87,9 @@ fn a_tilted_sheet_tells_the_focal_length_and_one_from_above_does_not() {
 
 #[test]
 fn the_focal_length_costs_nothing_on_the_table_and_more_above_it() {
-    // Vertically from above at 0.5 m, a point h above the table at distance d from the point below the camera is
-    // displaced by d h / (H - h), H in proportion to the focal length: at d = 0.2 m and h = 0.03 m by 12.77 mm for 0.5
-    // m and by 11.54 mm for 0.55 m.
+    // Let the camera be vertically above the table at height H = 0.5 m, and a point at height h, at the horizontal
+    // distance d from the camera. The point is displaced by d h / (H - h), and H is proportional to the focal length.
+    // For d = 0.2 m and h = 0.03 m this is 12.77 mm at H = 0.5 m and 11.54 mm at H = 0.55 m.
     let camera = PinholeCamera { fx: 1000.0, fy: 1000.0, cx: 640.0, cy: 360.0, ..PHONE };
     let pose = camera_from_board(&board(), &camera, [640.0, 360.0], 0.5, [0.0, 0.0, 0.0]);
     let corners = corners(&camera, &pose, 0.0, &mut Random(1));
@@ -97,7 +97,7 @@ fn the_focal_length_costs_nothing_on_the_table_and_more_above_it() {
     let table = focal_cost(&camera, &board(), &corners, 0.0, 0.1).unwrap();
     assert!(table.at_border_m < 1e-6, "{table:?}");
     let above = focal_cost(&camera, &board(), &corners, 0.03, 0.1).unwrap();
-    // The picture's corner is 0.367 m from the point below the camera; 0.9 of the focal length moves it most.
+    // The picture's corner is at a distance of 0.367 m; 0.9 of the focal length gives the largest displacement.
     let distance = (0.32_f64.powi(2) + 0.18_f64.powi(2)).sqrt();
     let expected = distance * (0.03 / 0.45 - 0.03 / 0.5);
     assert!((above.at_border_m - expected).abs() < 1e-6, "{above:?}, expected {expected}");

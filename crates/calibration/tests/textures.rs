@@ -3,16 +3,16 @@
 use crate::rendering::Random;
 use image::{GrayImage, Luma};
 
-/// The picture.
+/// The kind of texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Texture {
     /// Planks with grain, knots and dark joints.
     Planks,
-    /// A weave of threads of uneven brightness.
+    /// A weave of threads of varying brightness.
     Cloth,
-    /// Tiles or bricks, each of its own brightness, with joints.
+    /// Tiles or bricks of varying brightness, with joints.
     Tiles,
-    /// Blots of any size.
+    /// Spots of any size.
     Gravel,
     /// Grains in nearly regular rows, as in cork and carbon fibre.
     Grains,
@@ -22,7 +22,7 @@ pub const TEXTURES: [Texture; 5] = [Texture::Planks, Texture::Cloth, Texture::Ti
 
 const SIDE: u32 = 320;
 
-/// Noise without steps: random values at whole positions, interpolated smoothly.
+/// Smooth noise: random values at whole positions, interpolated.
 struct Noise(u64);
 
 impl Noise {

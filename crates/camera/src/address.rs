@@ -13,18 +13,18 @@ use crate::http::Url;
 ///
 /// | text | camera |
 /// |---|---|
-/// | `v4l:` | the first V4L2 node with a format that is read here |
-/// | `v4l:/dev/video2`, `v4l:RealSense` | that node; the first node whose card's name contains that |
-/// | `http://[USER:PASSWORD@]HOST[:PORT]/PATH` | motion JPEG, or one JPEG or PNG that is fetched again and again |
+/// | `v4l:` | the first V4L2 node with a supported format |
+/// | `v4l:/dev/video2`, `v4l:RealSense` | the node with this path; the first node whose card name contains this text |
+/// | `http://[USER:PASSWORD@]HOST[:PORT]/PATH` | motion JPEG, or one JPEG or PNG that is requested repeatedly |
 /// | `cmd:PROGRAM ARGUMENTS` | a program that writes JPEG, PNG or PPM pictures to its standard output |
-/// | `dir:FOLDER` | its pictures (PNG, JPEG, PPM, WebP, BMP, TIFF) in the order of their names; options as below |
-/// | `file:PATH` | one picture, once; with `?loop` again and again |
+/// | `dir:FOLDER` | the folder's pictures (PNG, JPEG, PPM, WebP, BMP, TIFF) in the order of their names; options below |
+/// | `file:PATH` | one picture, once; with `?loop` repeatedly |
 /// | `sim:REST` | the simulated camera, which another crate opens |
 /// | `ros2:TOPIC`, `ros2:TOPIC?OPTIONS` | a topic of ROS 2 with sensor_msgs/Image or CompressedImage, which another crate opens |
 ///
-/// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures per second; default: as fast as
-/// they are read), `loop` (starts again after the last picture), `follow` (`dir:` only: waits for new files). A path
-/// that contains `?` must be followed by another `?`.
+/// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures per second; default: no delay),
+/// `loop` (starts again after the last picture), `follow` (`dir:` only: waits for new files). If the path itself
+/// contains `?`, another `?` must follow it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Address {
     /// `v4l:`, a camera of Video4Linux 2.
@@ -67,7 +67,7 @@ pub enum NodeName {
 /// Playback settings of picture files.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Playback {
-    /// Time between pictures; `None`: as fast as they are read.
+    /// Time between pictures; `None` for no delay.
     pub interval: Option<Duration>,
     /// Starts again after the last picture.
     pub is_looped: bool,
@@ -76,7 +76,7 @@ pub struct Playback {
 }
 
 impl Address {
-    /// Whether the source is live, so that frames that are not fetched are lost; files and folders wait.
+    /// Whether the source is live, so that unread frames are lost. Pictures in files and folders are never lost.
     pub fn is_live(&self) -> bool {
         !matches!(self, Self::Folder { .. } | Self::File { .. })
     }
@@ -102,7 +102,7 @@ impl FromStr for Address {
             })),
             "http" => text.parse().map(Self::Http),
             "https" => {
-                Err(refused("http://, since TLS is not spoken here (cmd:curl -sN URL or cmd:ffmpeg fetches https)"))
+                Err(refused("http://, because https is not supported (cmd:curl -sN URL or cmd:ffmpeg fetches https)"))
             }
             "cmd" => rest.parse().map(Self::Command).map_err(|error| match error {
                 CameraError::Address { expected, .. } => refused(&expected),
@@ -233,7 +233,7 @@ mod tests {
             ("", "address of a camera"),
             ("/dev/video0", "v4l:/dev/video0"),
             ("rtsp://camera/", "address of a camera"),
-            ("https://camera/", "TLS is not spoken"),
+            ("https://camera/", "https is not supported"),
             ("http://", "HOST"),
             ("cmd:", "a program"),
             ("ros2:", "a topic after ros2:"),

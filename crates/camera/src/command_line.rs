@@ -7,8 +7,9 @@ use crate::error::CameraError;
 
 /// A program and its arguments.
 ///
-/// Words are separated by blanks; `'…'` and `"…"` keep blanks, a backslash keeps the next character (within `'…'` it is
-/// an ordinary character). Variables, wildcards, pipes and redirections are not supported; use `sh -c '…'` for them.
+/// Words are separated by blanks. Quotes (`'…'` and `"…"`) preserve blanks, and a backslash preserves the next
+/// character (within `'…'` it is an ordinary character). Variables, wildcards, pipes and redirections are not
+/// supported; use `sh -c '…'` for them.
 ///
 /// ```
 /// let line: sdg_camera::CommandLine = r#"ffmpeg -i 'my film.mp4' -f mjpeg -"#.parse()?;
@@ -22,7 +23,7 @@ pub struct CommandLine {
 }
 
 impl CommandLine {
-    /// The program, then its arguments; never empty.
+    /// The program and its arguments; never empty.
     pub fn words(&self) -> &[String] {
         &self.words
     }
@@ -59,7 +60,7 @@ impl FromStr for CommandLine {
             }
         }
         if let Some(open) = quote {
-            return Err(refused(&format!("a second {open} that closes the first")));
+            return Err(refused(&format!("a closing {open}")));
         }
         words.extend(word);
         if words.first().is_none_or(String::is_empty) {

@@ -1,4 +1,4 @@
-//! Decoding the bytes of one picture to pixels.
+//! Decodes the bytes of one picture to pixels.
 
 use image::RgbImage;
 use sdg_picture::{ImageLimits, PixelFrame, decode_image_in};
@@ -11,10 +11,10 @@ pub(crate) const MAX_ENCODED_BYTES: usize = 32 << 20;
 /// The signature of PNG files.
 pub(crate) const PNG_START: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Decodes one picture like a file of the same format; the format is recognised by the first bytes.
+/// Decodes one picture in the same way as a file of its format, which is recognised by the first bytes.
 ///
 /// # Errors
-/// Text that says what was found in place of a complete picture.
+/// Text that describes the data found instead of a complete picture.
 pub fn decode(bytes: &[u8], frame: PixelFrame) -> Result<RgbImage, String> {
     decode_image_in(bytes, &ImageLimits::default(), frame).map_err(|error| error.to_string())
 }
@@ -24,7 +24,7 @@ pub(crate) mod tests {
     use image::codecs::jpeg::JpegEncoder;
     use image::{Rgb, RgbImage};
 
-    /// A picture of many colours and edges as JPEG.
+    /// A JPEG of a picture with many colours and edges.
     pub(crate) fn jpeg(width: u32, height: u32) -> Vec<u8> {
         let picture = RgbImage::from_fn(width, height, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8]));
         let mut bytes = Vec::new();

@@ -1,20 +1,20 @@
-//! Errors of cameras.
+//! The error type of this crate.
 
 use crate::fault::Fault;
 
-/// Why there is no frame.
+/// The reason why there is no frame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CameraError {
-    /// Text that is not a camera address.
+    /// The text is not a camera address.
     #[error("expected {expected}, found \"{found}\"")]
     Address {
         /// The expected form.
         expected: String,
         found: String,
     },
-    /// An address that another crate opens.
+    /// The address must be opened by another crate.
     #[error("{address}: expected a caller that opens simulated cameras and topics of ROS 2; the crate camera does not")]
     OpenedElsewhere { address: String },
     /// The camera cannot be opened.
@@ -25,7 +25,7 @@ pub enum CameraError {
         /// What was expected and found.
         why: String,
     },
-    /// A setting that the camera does not have or rejects.
+    /// The camera does not have the setting, or rejects it.
     #[error("{address}: expected a camera with the setting {setting}, found {found}")]
     Setting {
         address: String,
@@ -40,25 +40,25 @@ pub enum CameraError {
         camera: String,
         fault: Fault,
     },
-    /// The camera has ended permanently: reopening it would end in the same way.
+    /// The camera has ended permanently: if reopened, it would end in the same way.
     #[error("{camera}: {why}")]
     Ended { camera: String, why: String },
-    /// A port of 127.0.0.1 cannot be taken.
+    /// The port of 127.0.0.1 cannot be bound.
     #[error("expected a free port of 127.0.0.1, found port {port}: {source}")]
     Port {
-        /// The port; 0 stands for any.
+        /// The port, or 0 for any free port.
         port: u16,
         source: std::io::Error,
     },
 }
 
 impl CameraError {
-    /// Whether the camera may deliver frames again; the next call tries.
+    /// Whether the next call may deliver a frame again.
     pub fn is_passing(&self) -> bool {
         self.fault().is_some()
     }
 
-    /// The fault, if the error is one.
+    /// The fault, if the error is [`CameraError::Fault`].
     pub fn fault(&self) -> Option<&Fault> {
         match self {
             Self::Fault { fault, .. } => Some(fault),

@@ -16,28 +16,28 @@ pub enum Fault {
         /// Seconds since the last frame, or since the camera was opened.
         silent_secs: f64,
     },
-    /// A frame that is incomplete or cannot be decoded; it is not delivered.
+    /// A frame is incomplete or cannot be decoded; it is not delivered.
     Torn {
-        /// The data received.
+        /// A description of the data received.
         found: String,
     },
-    /// The connection is lost; each further call tries to reopen it.
+    /// The connection is lost; each further call may try to reopen it.
     Gone {
         /// The cause of the loss, or why reopening failed.
         why: String,
     },
-    /// Bit-identical frames many times in a row; the noise of a real sensor differs in every frame.
+    /// Bit-identical frames many times in a row. The noise of a real sensor differs in every frame.
     Frozen {
         /// Number of identical frames in a row, including this one.
         num_frames: u32,
     },
     /// Nearly all pixels are close to 0, as with a lens cap.
     Black,
-    /// The picture's size differs from that of the frame before.
+    /// The picture's size differs from the previous frame's.
     OtherSize {
-        /// Width and height before.
+        /// Width and height of the previous frame.
         before: (u32, u32),
-        /// Width and height now.
+        /// Width and height of this frame.
         now: (u32, u32),
     },
     /// The first frame after [`Fault::Gone`].
@@ -69,7 +69,7 @@ impl fmt::Display for Fault {
             Self::Torn { found } => write!(f, "torn: expected a whole picture, found {found}"),
             Self::Gone { why } => write!(f, "gone: {why}"),
             Self::Frozen { num_frames } => write!(f, "frozen: the same picture {num_frames} times in a row"),
-            Self::Black => write!(f, "black: hardly a pixel that is not near 0"),
+            Self::Black => write!(f, "black: nearly all pixels are close to 0"),
             Self::OtherSize { before, now } => {
                 write!(f, "other size: {} × {} pixels, before {} × {}", now.0, now.1, before.0, before.1)
             }

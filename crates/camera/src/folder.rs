@@ -1,4 +1,4 @@
-//! `dir:` and `file:`: pictures from files.
+//! `dir:` and `file:`: pictures in files.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -15,10 +15,10 @@ use crate::decode::{MAX_ENCODED_BYTES, decode};
 use crate::error::CameraError;
 use crate::source::{Missing, Source, Taken};
 
-/// Interval of checks for new files.
+/// Interval between checks for new files.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
-/// Time for which the length of an undecodable file must not change; until then the file is assumed to be still
-/// written.
+/// Time for which the length of an undecodable file must be constant; before that, the file is assumed to be
+/// incomplete.
 const UNCHANGED_TIME: Duration = Duration::from_millis(500);
 /// Extensions of files that are read as pictures.
 const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "ppm", "webp", "bmp", "tif", "tiff"];
@@ -27,7 +27,7 @@ const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "ppm", "webp", "bmp", "tif"
 pub(crate) struct Folder {
     place: Place,
     playback: Playback,
-    /// Names already played; with `follow`, a name that appears later is played regardless of its order.
+    /// Names that were already played. With `follow`, a name that appears later is played whatever its order.
     played: BTreeSet<OsString>,
     num_played: u64,
     next_at: Instant,
@@ -64,7 +64,7 @@ impl Folder {
         };
         let metadata = fs::metadata(path).map_err(|error| refused(error.to_string()))?;
         if metadata.is_dir() {
-            return Err(refused(format!("a folder, for which there is dir:{}", path.display())));
+            return Err(refused(format!("a folder; use dir:{}", path.display())));
         }
         Ok(Self::at(Place::File(path.to_owned()), playback))
     }
@@ -90,7 +90,7 @@ impl Folder {
         match &self.place {
             Place::File(path) => Ok((self.num_played == 0 || self.playback.is_looped).then(|| path.clone())),
             Place::Folder(folder) => {
-                // The folder is listed again for each picture: files may appear and disappear.
+                // The folder is listed again for each picture, because files may appear and disappear.
                 let names =
                     names(folder).map_err(|error| Missing::Gone(format!("the folder cannot be read: {error}")))?;
                 let mut next = names.iter().find(|name| !self.played.contains(*name));
@@ -139,7 +139,7 @@ impl Source for Folder {
     }
 }
 
-/// The sorted names of the pictures in a folder. Hidden files are left out: programs often write under a hidden name
+/// The sorted names of the pictures in a folder, without hidden files: programs often write a file under a hidden name
 /// first.
 fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     let is_picture = |name: &OsString| {
@@ -154,8 +154,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     Ok(names)
 }
 
-/// Reads a picture; if it cannot be decoded and still grows, reads it again until it can. Also returns its modification
-/// time.
+/// Reads a picture and its modification time. While the picture cannot be decoded and the file grows, it is read again.
 fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, SystemTime), String> {
     let mut unchanged: Option<(u64, Instant)> = None;
     loop {
@@ -173,7 +172,7 @@ fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, Sys
             Some((length, _)) if length == read as u64 => {}
             _ => unchanged = Some((read as u64, Instant::now())),
         }
-        // A file that was modified long ago is not being written.
+        // A file that was modified long ago is complete.
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
         if age.is_some_and(|age| age > UNCHANGED_TIME * 4) {
             return Err(found);
@@ -232,7 +231,7 @@ mod tests {
         assert!(matches!(followed.take(soon()), Err(Missing::Late)));
         write(&files, "b.png", &png(2));
         assert_eq!(level(&mut followed), Some(2));
-        // A name that sorts earlier appears later; at first only half of the file exists.
+        // A name that sorts earlier appears later; at first, only half of the file exists.
         let bytes = png(1);
         let (half, rest) = bytes.split_at(bytes.len() / 2);
         write(&files, "a.png", half);
@@ -281,6 +280,6 @@ mod tests {
         assert!(
             refused(Folder::open(&files.path().join("no"), Playback::default(), "dir:x")).contains("expected a folder")
         );
-        assert!(refused(Folder::open_file(files.path(), Playback::default(), "file:x")).contains("there is dir:"));
+        assert!(refused(Folder::open_file(files.path(), Playback::default(), "file:x")).contains("a folder; use dir:"));
     }
 }

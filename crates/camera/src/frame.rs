@@ -14,9 +14,9 @@ use crate::fault::Fault;
 pub struct Frame {
     /// The pixels, decoded to RGB.
     pub picture: RgbImage,
-    /// Number assigned by the camera, from 0; a gap means frames that were not delivered.
+    /// Number assigned by the camera, from 0; a gap means that frames were not delivered.
     pub number: u64,
-    /// Capture time; arrival time if the camera does not give one.
+    /// Capture time, or the arrival time if the camera provides none.
     pub captured: SystemTime,
     /// The camera's address as given, without the password.
     pub camera: Arc<str>,
@@ -25,14 +25,14 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame without faults that was captured now.
+    /// A frame without faults, captured now.
     pub fn new(picture: RgbImage, number: u64, camera: Arc<str>) -> Self {
         Self { picture, number, captured: SystemTime::now(), camera, faults: Vec::new() }
     }
 }
 
 impl fmt::Debug for Frame {
-    /// Omits the pixels.
+    /// Prints the frame without its pixels.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (width, height) = self.picture.dimensions();
         write!(f, "frame {} of {}, {width} × {height} pixels, faults {:?}", self.number, self.camera, self.faults)
@@ -44,11 +44,11 @@ pub trait Camera: Send {
     /// Waits for the next frame; `None` if there are no more, as at the end of a folder.
     ///
     /// # Errors
-    /// A fault of this frame or camera. After an error with [`CameraError::is_passing`], the next call continues.
+    /// A fault of this frame or camera. After an error with [`CameraError::is_passing`], the next call tries again.
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError>;
 
-    /// Whether pictures are taken or read only on request, so that none becomes old or is lost while the previous one
-    /// is processed.
+    /// Whether pictures are taken or read only on request, so that no picture becomes old or is lost while the previous
+    /// one is processed.
     fn is_on_request(&self) -> bool {
         false
     }
@@ -67,7 +67,7 @@ impl<C: Camera + ?Sized> Camera for Box<C> {
 /// The mean of all channels of all pixels, 0 to 255; 0 for a picture without pixels.
 pub fn mean_brightness(picture: &RgbImage) -> f64 {
     let bytes = picture.as_raw();
-    // Sums of 4 KiB rows fit into u32, which is four times as fast as adding u64.
+    // Sums of 4 KiB rows fit into u32, whose addition is four times as fast as that of u64.
     let sum: u64 =
         bytes.chunks(1 << 12).map(|row| u64::from(row.iter().map(|&byte| u32::from(byte)).sum::<u32>())).sum();
     sum as f64 / bytes.len().max(1) as f64

@@ -10,13 +10,13 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// Maximum number of unread errors; the oldest are dropped.
+/// Maximum number of unread errors; the oldest ones are dropped.
 const MAX_ERRORS: usize = 16;
 
 /// The newest frame of a camera that a thread reads; older frames are dropped and counted.
 ///
-/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. Dropping it waits
-/// until the thread has finished its current frame, so that the camera is then closed.
+/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. When dropped, it
+/// waits until the thread has finished its current frame and the camera is closed.
 pub struct LatestFrame {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -39,7 +39,7 @@ struct Newest {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Newest> {
-        // No operation under this lock can leave it half done.
+        // No operation under this lock can leave the data in an invalid state.
         self.newest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -57,7 +57,7 @@ impl LatestFrame {
                     Ok(Some(mut frame)) => {
                         if let Some(dropped) = newest.frame.take() {
                             newest.num_dropped += 1;
-                            // These faults are reported once, so they are kept for a caller that missed the frame.
+                            // A camera reports these faults once, so they are kept for a caller that missed the frame.
                             let once = |fault: &Fault| matches!(fault, Fault::Back { .. } | Fault::OtherSize { .. });
                             frame.faults.extend(dropped.faults.into_iter().filter(once));
                         }
@@ -83,8 +83,8 @@ impl LatestFrame {
         Self { shared, thread: Some(thread) }
     }
 
-    /// The newest frame that was not taken yet. Waits for it; returns `None` after the timeout and at the camera's end
-    /// ([`has_ended`](Self::has_ended)).
+    /// The newest frame that was not taken yet; waits for it if there is none. Returns `None` after the timeout and at
+    /// the camera's end ([`has_ended`](Self::has_ended)).
     ///
     /// # Errors
     /// Each error of the camera, once, before later frames.
@@ -107,14 +107,14 @@ impl LatestFrame {
         }
     }
 
-    /// Whether there are no more frames and all were taken.
+    /// Whether there are no more frames and all frames were taken.
     pub fn has_ended(&self) -> bool {
         let newest = self.shared.lock();
         newest.has_ended && newest.frame.is_none() && newest.errors.is_empty()
     }
 
-    /// Number of frames that were replaced by a newer one before they were taken. Gaps in [`Frame::number`] also
-    /// include frames that the camera did not deliver.
+    /// Number of frames that were replaced by newer ones before they were taken. Gaps in [`Frame::number`] also count
+    /// frames that the camera did not deliver.
     pub fn num_dropped(&self) -> u64 {
         self.shared.lock().num_dropped
     }
@@ -123,10 +123,10 @@ impl LatestFrame {
 impl Camera for LatestFrame {
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
         loop {
-            // The camera's own stall timeout ends the wait with an error, so the value here does not matter.
+            // The camera's own stall timeout ends the wait with an error, so this timeout has no effect.
             match self.take(Duration::from_secs(1))? {
                 Some(frame) => return Ok(Some(frame)),
-                // A thread that panicked has finished without reporting it.
+                // The thread may have panicked and finished without reporting the end.
                 None if self.has_ended() || self.thread.as_ref().is_none_or(JoinHandle::is_finished) => {
                     return Ok(None);
                 }
@@ -155,7 +155,7 @@ mod tests {
     use image::RgbImage;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// Gives a frame for each number that is sent, and a torn one for `None`; sends a message before each.
+    /// Delivers a frame for each number that is sent, and a torn one for `None`; sends a message before each.
     pub(super) struct Driven(pub(super) Receiver<Option<u64>>, pub(super) Sender<()>);
 
     impl Camera for Driven {
@@ -174,15 +174,15 @@ mod tests {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();
         let mut latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
-        // Declared last, so that it is dropped first if an assertion fails: `latest` would wait for its thread for
-        // ever.
+        // Declared last, so that it is dropped first if an assertion fails; otherwise `latest` would wait for its
+        // thread for ever.
         let send = send;
         assert!(latest.take(Duration::from_millis(20)).unwrap().is_none() && !latest.has_ended());
         for number in 0..5 {
             was_asked.recv().unwrap();
             send.send(Some(number)).unwrap();
         }
-        // When the sixth is requested, the fifth is stored.
+        // The request for the sixth frame shows that the fifth is stored.
         was_asked.recv().unwrap();
         assert_eq!(latest.take(Duration::ZERO).unwrap().unwrap().number, 4);
         assert_eq!(latest.num_dropped(), 4);

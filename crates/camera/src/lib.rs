@@ -1,17 +1,17 @@
-//! Live pictures: a trait and its implementations for several kinds of cameras.
+//! Live pictures: a trait, and its implementations for several kinds of cameras.
 //!
 //! ```text
 //! Address ── open ── Source: V4L2 node, HTTP, program, folder ── Reconnecting ── Watched ── Box<dyn Camera>
-//!                    pictures of one connection                  opens again     Frame.faults   │
+//!                    pictures of one connection                  reconnects      Frame.faults   │
 //!                                                                                  LatestFrame ─┘ a thread; newest frame only
 //! MjpegServer: pictures out, to browsers on this computer
 //! ```
 //! [`Camera::next_frame`] returns within about the stall timeout, with a [`Frame`] or an error. A camera's problem is a
-//! [`Fault`]: if there still is a picture (frozen, black, another size, back again), it is in [`Frame::faults`]; if
-//! there is none (stale, torn, gone), it is a [`CameraError::Fault`], and the next call continues.
+//! [`Fault`]. If there is a picture (frozen, black, other size, back again), the fault is in [`Frame::faults`]; if
+//! there is none (stale, torn, gone), it is a [`CameraError::Fault`], and the next call tries again.
 //!
-//! Absent: any knowledge of lenses and tables (crate `calibration`), the simulated camera (crate `simulation`;
-//! [`Address::Sim`] is parsed here and opened there), TLS, sound, and video codecs other than motion JPEG.
+//! Not in this crate: lenses and tables (crate `calibration`), the simulated camera (crate `simulation`, which opens
+//! [`Address::Sim`]), TLS, sound, and video codecs other than motion JPEG.
 //!
 //! ```
 //! use sdg_camera::{Address, OpenOptions, open};

@@ -1,4 +1,4 @@
-//! Opening the camera at an address.
+//! Opens the camera at an address.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,10 +17,11 @@ use crate::watched::Watched;
 
 /// Range of requested frame rates, in frames per second.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
-/// Range of stall timeouts: longer than a frame takes, shorter than anyone would wait.
+/// Range of stall timeouts: longer than the time of a frame, at most an hour.
 const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
 
-/// Opens the camera at an address. The camera is reopened when its connection is lost, and watched for faults.
+/// Opens the camera at an address. The camera is reopened if its connection is lost, and its frames are checked for
+/// faults.
 ///
 /// # Errors
 /// [`CameraError::Open`] and [`CameraError::Setting`] if it cannot be opened or rejects its settings,

@@ -29,8 +29,8 @@ impl Encoding {
     }
 }
 
-/// Settings requested from a camera. `width`, `height`, `encoding`, `exposure_secs` and `white_balance_kelvin` apply to
-/// V4L2; other kinds of cameras deliver frames as they are, and the frames state their size.
+/// Settings requested from a camera. `width`, `height`, `encoding`, `exposure_secs` and `white_balance_kelvin` apply
+/// only to V4L2. Other cameras deliver frames unchanged, and the frames state their size.
 #[derive(Debug, Clone)]
 pub struct OpenOptions {
     /// Width in pixels; the nearest available size is used.
@@ -46,7 +46,7 @@ pub struct OpenOptions {
     pub exposure_secs: Option<f64>,
     /// Fixed white balance in kelvin; `None` for automatic white balance.
     pub white_balance_kelvin: Option<u32>,
-    /// Orientation of pictures with an Exif orientation: with a calibration, the sensor's.
+    /// Orientation of pictures with an Exif orientation. A calibration needs the sensor's.
     pub frame: PixelFrame,
     /// Time without a frame after which a camera is [`Fault::Stale`](crate::Fault::Stale).
     pub stall_timeout: Duration,

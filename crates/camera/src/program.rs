@@ -17,15 +17,15 @@ use crate::splitter::Splitter;
 
 /// Bytes per read from the program.
 const PIECE_BYTES: usize = 64 << 10;
-/// Maximum number of bytes kept of a line on standard error.
+/// Maximum number of bytes that are kept of a line on standard error.
 const MAX_LINE_BYTES: u64 = 1 << 10;
-/// Time for a program to exit after it has closed its standard output.
+/// Time limit for a program to exit after it has closed its standard output.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A picture as received, still encoded; or text that describes invalid data.
 type Arrived = (SystemTime, Result<Vec<u8>, String>);
 
-/// A running program. Pictures are taken in order without gaps: a program that is faster than its reader waits.
+/// A running program. Pictures are taken in order without gaps: a program that is faster than its reader must wait.
 pub(crate) struct Program {
     child: Child,
     pictures: Option<Receiver<Arrived>>,
@@ -70,7 +70,7 @@ impl Program {
                 Err(error) => return Err(Missing::Gone(format!("the program's state is unknown: {error}"))),
             }
         };
-        // The program has exited, so its standard error ends too, unless a child process holds it open.
+        // The program has exited, so its standard error ends as well, unless a child process holds it open.
         while self.threads.iter().any(|thread| !thread.is_finished()) && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -78,7 +78,7 @@ impl Program {
             return Ok(None);
         }
         let why = self.with_last_line(status);
-        // A program with wrong arguments exits at once; restarting it would not help.
+        // A program with wrong arguments exits immediately; restarting it would have the same result.
         Err(if self.has_delivered { Missing::Gone(why) } else { Missing::Ended(why) })
     }
 
@@ -110,12 +110,12 @@ impl Source for Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // Ends the reading thread if it waits for its picture to be taken.
+        // Dropping the receiver ends the reading thread if it waits for its picture to be taken.
         self.pictures = None;
-        // It may have exited already; without `wait` it would remain a zombie.
+        // The program may have exited already. Without `wait`, it would remain a zombie.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        // The threads are not joined: a grandchild process may hold the pipes open. They end with the pipes.
+        // The threads are not joined: they end when the pipes are closed, and a grandchild process may hold these open.
     }
 }
 
@@ -147,8 +147,8 @@ fn keep_last_line(stderr: ChildStderr, last_line: &Mutex<String>) {
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        // Programs that show progress end their lines with a carriage return and never with a line feed, so the length
-        // is bounded.
+        // Programs that show progress end their lines with a carriage return instead of a line feed, so the length is
+        // bounded.
         match reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}

@@ -9,20 +9,20 @@ use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 use crate::source::{Missing, Source, fault};
 
-/// Pause before the first attempt to reopen; each further pause is twice as long.
+/// Pause before the first attempt to reopen. Each further pause is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// Maximum pause: a camera that was plugged in again is back after this time.
+/// Maximum pause: a camera that was plugged in again is reopened within this time.
 const MAX_PAUSE: Duration = Duration::from_secs(5);
-/// Number of stall timeouts in a row after which the connection is dropped: the other end may have disappeared
-/// silently.
+/// Number of stall timeouts in a row after which the connection is dropped: the other end may have disappeared without
+/// closing it.
 const MAX_STALLS: u32 = 3;
-/// Number of torn frames in a row after which the connection is dropped: frame boundaries may be lost.
+/// Number of torn frames in a row after which the connection is dropped: the frame boundaries may be lost.
 const MAX_TORN: u32 = 30;
 
-/// Opens a connection, until the deadline if the system allows.
+/// Opens a connection; the deadline applies if the operating system supports one.
 pub(crate) type Opener = Box<dyn FnMut(Instant) -> Result<Box<dyn Source>, CameraError> + Send>;
 
-/// Numbers the frames across successive connections.
+/// A camera that is reopened; frames are numbered across its connections.
 pub(crate) struct Reconnecting {
     name: Arc<str>,
     opener: Opener,
@@ -47,7 +47,7 @@ impl Reconnecting {
     /// Opens the first connection.
     ///
     /// # Errors
-    /// Those of the opener: a wrong address fails at once.
+    /// The errors of the opener: a wrong address fails immediately.
     pub(crate) fn open(name: Arc<str>, mut opener: Opener, stall_timeout: Duration) -> Result<Self, CameraError> {
         let source = opener(Instant::now() + stall_timeout)?;
         Ok(Self {
@@ -76,7 +76,7 @@ impl Reconnecting {
         fault(&self.name, Fault::Gone { why })
     }
 
-    /// Reopens when it is time, until the deadline at most.
+    /// Tries to reopen if it is time, at most until the deadline.
     fn reopen(&mut self, deadline: Instant) -> Result<(), CameraError> {
         let (retry_at, why) = match &self.lost {
             Some(lost) => (lost.retry_at, lost.why.clone()),
@@ -96,7 +96,7 @@ impl Reconnecting {
     }
 }
 
-/// Removes the address, which the fault's text would repeat.
+/// Removes the address, which the fault's text already contains.
 fn without_address(error: &CameraError, name: &str) -> String {
     let text = error.to_string();
     text.strip_prefix(name).and_then(|rest| rest.strip_prefix(": ")).map_or(text.clone(), str::to_owned)
@@ -130,7 +130,7 @@ impl Camera for Reconnecting {
                 self.num_stalls += 1;
                 let silent_secs = self.last_frame.elapsed().as_secs_f64();
                 if self.num_stalls >= MAX_STALLS {
-                    return Err(self.lose(format!("no frame for {silent_secs:.1} s, so it is opened again")));
+                    return Err(self.lose(format!("no frame for {silent_secs:.1} s, so it is reopened")));
                 }
                 Err(fault(&self.name, Fault::Stale { silent_secs }))
             }
@@ -211,7 +211,7 @@ mod tests {
         assert_eq!(fault_of(&mut camera), Fault::Torn { found: "half".into() });
         assert_eq!(camera.next_frame().unwrap().unwrap().number, 2);
         assert_eq!(fault_of(&mut camera), Fault::Gone { why: "cable".into() });
-        // The pause of 100 ms is longer than the stall timeout of 50 ms: this call ends before the connection is
+        // The pause of 100 ms is longer than the stall timeout of 50 ms, so this call ends before the connection is
         // reopened.
         assert!(matches!(fault_of(&mut camera), Fault::Gone { .. }));
         let back = loop {

@@ -12,15 +12,15 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::error::CameraError;
 
-/// JPEG quality, 1 to 100: at 90 thin lines keep their colours.
+/// JPEG quality from 1 to 100; at 90, thin lines keep their colours.
 const QUALITY: u8 = 90;
-/// Time after which a browser that reads nothing is disconnected.
+/// Time limit for a browser to read data before it is disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time limit for receiving a request.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
-/// Interval of checks for the server's end while there are no pictures.
+/// Interval between checks whether the server ends, while there are no new pictures.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// Time limit at the end for browsers to receive the last picture.
+/// Time limit for browsers to receive the last picture at the end.
 const LAST_PICTURE_WITHIN: Duration = Duration::from_millis(500);
 /// Maximum number of connections; one user needs fewer.
 const MAX_CONNECTIONS: usize = 32;
@@ -34,15 +34,14 @@ const SCRIPT: &str = include_str!("page/page.js");
 ///
 /// | path | answer |
 /// |---|---|
-/// | `/` | a page with the live picture, which shows when the program has ended |
+/// | `/` | a page with the live picture, which also shows that the program has ended |
 /// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
 /// | `/snapshot.jpg` | the newest picture; status 503 before the first |
-/// | `/words` | what the newest picture shows, in words; empty before the first |
+/// | `/words` | the description of the newest picture; empty before the first |
 ///
 /// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser
-/// gets the newest picture when it is ready. Only requests that name 127.0.0.1 or localhost with this port are
-/// answered, and none from other pages: foreign host names that resolve to this address, and other pages, do not get
-/// the pictures.
+/// gets the newest picture when it is ready. Only requests to 127.0.0.1 or localhost with this port are answered, and
+/// none from other pages: neither other pages nor foreign host names that resolve to this address get the pictures.
 pub struct MjpegServer {
     shared: Arc<Shared>,
     port: u16,
@@ -60,9 +59,9 @@ struct Shared {
 struct Published {
     number: u64,
     picture: RgbImage,
-    /// Description for screen readers.
+    /// Description of the picture for screen readers.
     words: String,
-    /// Encoded on the first request.
+    /// The picture as JPEG, encoded on the first request.
     jpeg: OnceLock<Vec<u8>>,
 }
 
@@ -76,7 +75,7 @@ impl Published {
     fn jpeg(&self) -> &[u8] {
         self.jpeg.get_or_init(|| {
             let mut bytes = Vec::new();
-            // A picture without pixels cannot be encoded as JPEG, nor seen.
+            // A picture without pixels cannot be encoded as JPEG, and no browser could show it.
             let _ = JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&self.picture);
             bytes
         })
@@ -117,7 +116,7 @@ impl Drop for MjpegServer {
     fn drop(&mut self) {
         self.shared.is_stopped.store(true, Ordering::SeqCst);
         self.shared.changed.notify_all();
-        // Wakes the thread that waits for a connection.
+        // Connecting wakes the thread that waits for connections.
         let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -135,7 +134,7 @@ fn accept(listener: &TcpListener, port: u16, shared: &Arc<Shared>) {
             return;
         }
         let Ok(stream) = stream else {
-            // A connection that broke before it was accepted, or too many open files: the next one may succeed.
+            // A connection was closed before it was accepted, or too many files are open: the next attempt may succeed.
             std::thread::sleep(Duration::from_millis(10));
             continue;
         };
@@ -145,7 +144,7 @@ fn accept(listener: &TcpListener, port: u16, shared: &Arc<Shared>) {
         }
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
-            // A browser that has disconnected is not an error.
+            // It is not an error if a browser disconnects.
             let _ = serve(stream, port, &shared);
             shared.num_connections.fetch_sub(1, Ordering::SeqCst);
         });
@@ -178,7 +177,7 @@ fn serve(mut stream: TcpStream, port: u16, shared: &Shared) -> std::io::Result<(
     }
 }
 
-/// The path of an allowed request; otherwise a status and the reason.
+/// The path of an allowed request, or a status and the reason.
 type Asked = Result<String, (&'static str, &'static str)>;
 
 fn read_path(stream: &mut TcpStream, port: u16) -> std::io::Result<Asked> {
@@ -219,7 +218,7 @@ fn judge(request: &httparse::Request<'_, '_>, port: u16) -> Asked {
     Ok(request.path.unwrap_or_default().split('?').next().unwrap_or_default().to_owned())
 }
 
-/// Each response closes its connection, is not cached, and cannot be embedded in other pages.
+/// The head of a response. Each response closes its connection, is not cached, and cannot be embedded in other pages.
 fn head(status: &str, content_type: &str) -> String {
     format!(
         "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nConnection: close\r\nCache-Control: no-store\r\n\
@@ -244,14 +243,14 @@ fn stream_pictures(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<(
         let part = format!("Content-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n", jpeg.len());
         stream.write_all(part.as_bytes())?;
         stream.write_all(jpeg)?;
-        // Chromium shows a part when the next boundary arrives: without it, each picture would be shown one picture
-        // late.
+        // Chromium shows a part when the next boundary arrives. Without this boundary, each picture would be shown one
+        // picture late.
         stream.write_all(b"\r\n--sdg-picture\r\n")?;
     }
     Ok(())
 }
 
-/// Waits for a picture after number `last`; `None` when the server ends and all pictures were taken.
+/// Waits for a picture after number `last`; `None` if the server ends and all pictures were taken.
 fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
     let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
     loop {

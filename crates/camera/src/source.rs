@@ -1,4 +1,4 @@
-//! One connection to a camera, which gives pictures until it ends.
+//! One connection to a camera, which delivers pictures until it ends.
 
 use std::time::{Instant, SystemTime};
 
@@ -7,23 +7,23 @@ use image::RgbImage;
 use crate::error::CameraError;
 use crate::fault::Fault;
 
-/// Result of a connection.
+/// A picture of a connection.
 #[derive(Debug)]
 pub(crate) struct Taken {
     pub(crate) picture: RgbImage,
     pub(crate) captured: SystemTime,
-    /// Number of frames discarded before it because newer ones had arrived.
+    /// Number of frames before this one that were discarded because newer ones had arrived.
     pub(crate) num_skipped: u64,
 }
 
 impl Taken {
-    /// A picture that arrived now, without discarded ones before it.
+    /// A picture that has just arrived, with no frame discarded before it.
     pub(crate) fn now(picture: RgbImage) -> Self {
         Self { picture, captured: SystemTime::now(), num_skipped: 0 }
     }
 }
 
-/// Why a connection gave no picture.
+/// The reason why a connection gave no picture.
 #[derive(Debug)]
 pub(crate) enum Missing {
     /// No data until the deadline; the connection is still open.
@@ -32,7 +32,7 @@ pub(crate) enum Missing {
     Torn(String),
     /// The connection is lost.
     Gone(String),
-    /// The camera has ended permanently; reopening it would end in the same way.
+    /// The camera has ended permanently; if reopened, it would end in the same way.
     Ended(String),
 }
 
@@ -41,13 +41,13 @@ pub(crate) trait Source: Send {
     /// Waits for a picture until the deadline; `None` if there are no more.
     fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing>;
 
-    /// As [`Camera::is_on_request`](crate::Camera::is_on_request).
+    /// See [`Camera::is_on_request`](crate::Camera::is_on_request).
     fn is_on_request(&self) -> bool {
         false
     }
 }
 
-/// An error that carries a fault.
+/// A [`CameraError::Fault`] of this camera.
 pub(crate) fn fault(camera: &str, fault: Fault) -> CameraError {
     CameraError::Fault { camera: camera.to_owned(), fault }
 }

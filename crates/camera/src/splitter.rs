@@ -4,10 +4,10 @@ use sdg_picture::{JpegEnd, JpegScanner, PpmHead};
 
 use crate::decode::{MAX_ENCODED_BYTES, PNG_START};
 
-/// Number of bytes that belong to no picture after which they are reported at the latest.
+/// Number of bytes outside pictures after which they are reported at the latest.
 const MAX_GARBAGE_BYTES: usize = 1 << 20;
 
-/// The start marker, and the first byte of the next.
+/// The start marker, and the first byte of the next marker.
 const JPEG_START: [u8; 3] = [0xff, 0xd8, 0xff];
 
 /// Splits a stream at the ends of pictures.
@@ -35,10 +35,10 @@ impl Splitter {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The next complete picture, still encoded; `None` until more is pushed.
+    /// The next complete picture, still encoded; `None` if more data is needed.
     ///
     /// # Errors
-    /// Text that describes the data found in place of a complete picture; the next call continues after it.
+    /// Text that describes the data found instead of a complete picture. The next call continues after it.
     pub(crate) fn next_picture(&mut self) -> Option<Result<Vec<u8>, String>> {
         loop {
             match self.extent() {
@@ -49,7 +49,7 @@ impl Splitter {
                         return self.take_garbage().map(Err);
                     }
                 }
-                // The end of the garbage is unknown before the next bytes.
+                // Where the garbage ends is unknown before the next bytes.
                 Extent::NotYet if self.buffer.len() < PNG_START.len() => return None,
                 _ if self.garbage_bytes > 0 => return self.take_garbage().map(Err),
                 Extent::NotYet => return None,
@@ -67,7 +67,7 @@ impl Splitter {
         }
     }
 
-    /// At the end of the stream: a description of the incomplete picture, if any.
+    /// A description of the incomplete picture at the end of the stream, if any.
     pub(crate) fn rest(&mut self) -> Option<String> {
         match self.buffer.len() {
             0 => self.take_garbage(),
@@ -84,10 +84,10 @@ impl Splitter {
                 JpegEnd::At(end) => Extent::Ends(end),
                 JpegEnd::NotYet => Extent::NotYet,
                 JpegEnd::Broken(at) => {
-                    // A JPEG cut within a segment has swallowed the beginning of the next one.
+                    // A JPEG that was cut within a segment contains the beginning of the next picture.
                     let next = bytes[2..].windows(JPEG_START.len()).position(|start| start == JPEG_START);
                     let next = next.map_or(at, |next| at.min(next + 2));
-                    Extent::Broken(format!("a JPEG that breaks off after {next} bytes"), next.max(1))
+                    Extent::Broken(format!("a JPEG that ends after {next} bytes"), next.max(1))
                 }
             }
         } else if bytes[0] == PNG_START[0] {
@@ -107,7 +107,8 @@ impl Splitter {
         }
     }
 
-    /// Discards bytes up to one that may begin a picture. Blanks and zeros between pictures are common and not counted.
+    /// Discards bytes up to the next possible beginning of a picture. Blanks and zeros between pictures are common and
+    /// not counted.
     fn skip_garbage(&mut self) {
         let begin = (1..self.buffer.len()).find(|&at| may_begin_picture(&self.buffer[at..]));
         let skipped = begin.unwrap_or(self.buffer.len());
@@ -118,12 +119,12 @@ impl Splitter {
     fn take_garbage(&mut self) -> Option<String> {
         match std::mem::take(&mut self.garbage_bytes) {
             0 => None,
-            count => Some(format!("{count} bytes that begin no JPEG, PNG or PPM")),
+            count => Some(format!("{count} bytes that are not the beginning of a JPEG, PNG or PPM")),
         }
     }
 }
 
-/// Whether the bytes, with any continuation, can be a picture.
+/// Whether the bytes can be the beginning of a picture.
 fn may_begin_picture(bytes: &[u8]) -> bool {
     let begins = |start: &[u8]| bytes.iter().zip(start).all(|(found, expected)| found == expected);
     let is_ppm = || begins(b"P6") && bytes.get(2).is_none_or(|blank| blank.is_ascii_whitespace() || *blank == b'#');
@@ -190,7 +191,7 @@ mod tests {
         for piece in [1, 64, stream.len()] {
             let (found, rest) = split(&stream, piece);
             let texts: Vec<_> = found.iter().filter_map(|found| found.as_ref().err()).collect();
-            assert!(texts[0].contains("8 bytes that begin no JPEG"), "{texts:?}");
+            assert!(texts[0].contains("8 bytes that are not the beginning of a JPEG"), "{texts:?}");
             assert!(texts[1].contains("after 400 bytes"), "{texts:?}");
             assert!(texts[2].contains("0 × 0"), "{texts:?}");
             let pictures: Vec<_> = found.iter().filter_map(|found| found.as_ref().ok()).collect();

@@ -1,4 +1,4 @@
-//! Faults that are detected in the pictures: frozen, black, another size.
+//! Detects faults in the pictures: frozen, black, other size.
 
 use image::RgbImage;
 
@@ -6,22 +6,23 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// Maximum value of a channel that counts as black: compression of a black picture leaves small values.
+/// Maximum value of a channel in a black picture: compression leaves small values.
 const NEAR_BLACK: u8 = 24;
-/// One in this many channels may be brighter in a black picture: a sensor has single bright pixels.
+/// One channel in this many may be brighter in a black picture: sensors have single bright pixels.
 const MAX_BRIGHT_SHARE: usize = 1000;
 
 /// Adds the faults of a camera's pictures to [`Frame::faults`].
 pub struct Watched<C> {
     camera: C,
-    /// `None` if equal pictures are normal, as with files.
+    /// Number of equal pictures that count as frozen; `None` if equal pictures are normal, as in files.
     frozen_frames: Option<u32>,
     last: Option<RgbImage>,
     num_equal: u32,
 }
 
 impl<C: Camera> Watched<C> {
-    /// Watches a camera. `frozen_frames` bit-identical frames in a row are a fault; `None` disables this, as for files.
+    /// Watches a camera. `frozen_frames` bit-identical frames in a row are a fault; `None` disables this check, as for
+    /// files.
     pub fn new(camera: C, frozen_frames: Option<u32>) -> Self {
         Self { camera, frozen_frames, last: None, num_equal: 0 }
     }
@@ -62,7 +63,7 @@ impl<C: Camera> Camera for Watched<C> {
 fn is_black(picture: &RgbImage) -> bool {
     let bytes = picture.as_raw();
     let limit = bytes.len() / MAX_BRIGHT_SHARE;
-    // Except for black pictures, the first pixels decide.
+    // The first pixels usually exceed the limit, except in black pictures.
     bytes.iter().filter(|&&byte| byte > NEAR_BLACK).take(limit + 1).count() <= limit
 }
 

@@ -1,12 +1,12 @@
-//! Conversion of YUYV and padded rows to RGB.
+//! Converts YUYV and padded rows to RGB.
 
 use image::RgbImage;
 
-/// Converts rows of YUYV (4:2:2: two pixels share their chroma) to RGB. Luma 16 to 235 and BT.601's matrix, the default
-/// of the USB video class; integer arithmetic, at most one step of error.
+/// Converts rows of YUYV (4:2:2: two pixels have common chroma) to RGB, with luma from 16 to 235 and BT.601's matrix,
+/// the default of the USB video class. Integer arithmetic, with an error of at most one step.
 ///
 /// # Errors
-/// Text with the number of bytes found, if there are fewer than the rows need.
+/// Text with the number of bytes found, if the rows need more.
 pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     if width == 0 || width % 2 == 1 {
         return Err(format!("an odd width of {width} pixels"));
@@ -31,7 +31,7 @@ pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) 
 /// Converts rows of RGB24, which may be padded.
 ///
 /// # Errors
-/// As [`yuyv_to_rgb`].
+/// The errors of [`yuyv_to_rgb`].
 pub(crate) fn rgb24_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     let rows = rows(bytes, width as usize * 3, height, bytes_per_row)?;
     let pixels = rows.flatten().copied().collect();
@@ -64,7 +64,7 @@ mod tests {
         ([16, 128, 128], [0, 0, 0]),
     ];
 
-    /// The standard's bars are rounded to whole steps of YUV, which are up to two steps of RGB.
+    /// The standard's bars are rounded to whole steps of YUV, which correspond to up to two steps of RGB.
     const ROUNDING: i32 = 2;
 
     #[test]

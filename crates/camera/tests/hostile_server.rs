@@ -1,5 +1,5 @@
-//! Servers of motion JPEG and snapshots that stall, cut, send garbage, redirect and flood: the client survives, reports
-//! the fault, and recovers.
+//! Servers of motion JPEG and snapshots that stall, cut pictures, send garbage, redirect and flood. The client
+//! survives, reports the fault, and recovers.
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -14,7 +14,7 @@ use support::{Script, Server, jpeg, level_of, open, part};
 
 const OK: &str = "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=cut\r\n\r\n";
 
-/// A server that works: three pictures of level 200, then silence.
+/// A server without faults: three pictures of level 200, then no more data.
 fn recover(stream: &mut TcpStream) {
     let _ = stream.write_all(OK.as_bytes());
     for _ in 0..3 {
@@ -24,7 +24,7 @@ fn recover(stream: &mut TcpStream) {
     sleep(Duration::from_secs(20));
 }
 
-/// The faults until a picture of this level arrives, and that picture's faults.
+/// The faults until a picture of this level arrives, and the faults of that picture.
 fn faults_until(camera: &mut dyn Camera, level: u8) -> Vec<Fault> {
     let mut faults = Vec::new();
     let start = Instant::now();
@@ -127,7 +127,7 @@ fn garbage_is_told() {
         matches!(&faults[0], Fault::Torn { found } if found.contains("expected a PNG, JPEG, WebP, BMP or TIFF")),
         "{faults:?}"
     );
-    // Without any further boundary, nothing is kept and the silence is reported.
+    // Without another boundary, no data is kept and a stall is reported.
     let faults = faults_of(|stream| while stream.write_all(&[0x55; 1 << 16]).is_ok() {});
     assert!(matches!(faults[0], Fault::Stale { .. }), "{faults:?}");
 }
@@ -182,7 +182,7 @@ fn of_a_flood_the_newest_picture_is_given_and_the_numbers_show_the_gap() {
             break;
         }
     }
-    // All pictures have arrived long ago, so one read is enough; a busy machine may need some more.
+    // All pictures have arrived long ago, so that one read is enough; a busy machine may need a few more.
     assert!(num_frames < 20, "{num_frames} of 100");
 }
 
@@ -276,7 +276,7 @@ fn a_server_that_went_away_comes_back() {
 }
 
 /// A camera of single pictures that requires authentication; also returns the authenticated requests, and the number of
-/// others.
+/// other requests.
 fn locked_server(challenges: &'static str) -> (Server, Arc<Mutex<Vec<String>>>, Arc<AtomicUsize>) {
     let asked = Arc::new(Mutex::new(Vec::new()));
     let refused = Arc::new(AtomicUsize::new(0));

@@ -1,4 +1,4 @@
-//! The server's stream, read by the client, and by clients that are slow, come from another origin or violate the
+//! The server's stream, read by this crate's client and by clients that are slow, have another origin or violate the
 //! protocol.
 
 use std::io::{Read, Write};
@@ -23,7 +23,7 @@ fn port(server: &MjpegServer) -> u16 {
     server.url().trim_end_matches('/').rsplit(':').next().unwrap().parse().unwrap()
 }
 
-/// The complete response to these lines.
+/// The complete response to a request with these lines.
 fn ask(server: &MjpegServer, lines: &str) -> String {
     let mut stream = connect(server);
     stream.write_all(format!("{lines}\r\n\r\n").replace("PORT", &port(server).to_string()).as_bytes()).unwrap();
@@ -45,7 +45,7 @@ fn what_is_published_arrives_at_every_browser() {
     for level in [100, 150, 200] {
         server.publish(picture(level), format!("level {}", level));
         for camera in &mut cameras {
-            // At once, without waiting for the next picture; the previous one may come first.
+            // The new picture arrives without another one being published; the previous picture may come first.
             let arrived = loop {
                 let frame = camera.next_frame().unwrap().unwrap();
                 if frame.picture.get_pixel(9, 9)[0].abs_diff(level) < 5 {
@@ -80,7 +80,7 @@ fn a_browser_that_reads_nothing_holds_nobody_up() {
         longest = longest.max(start.elapsed());
         std::thread::sleep(Duration::from_millis(5));
     }
-    // Publishing only stores a picture; even on a busy machine it does not wait for browsers.
+    // Publishing only stores a picture and never waits for browsers, even on a busy machine.
     assert!(longest < Duration::from_secs(1), "{longest:?}");
     let frame = camera.next_frame().unwrap().unwrap();
     assert_eq!(frame.picture.dimensions(), (640, 480));

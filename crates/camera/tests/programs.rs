@@ -27,7 +27,7 @@ fn levels(camera: &mut dyn Camera) -> Vec<(u64, u8)> {
         .collect()
 }
 
-/// A folder with a stream of each kind: levels 40, 80, 120.
+/// A folder with one stream of each format: pictures of levels 40, 80 and 120.
 fn streams() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut streams: [(&str, Vec<u8>); 3] = [("jpeg", vec![]), ("png", vec![]), ("ppm", vec![])];
@@ -111,7 +111,7 @@ fn the_program_ends_with_its_camera() {
     let folder = tempfile::tempdir().unwrap();
     let id_file = folder.path().join("id");
     let start = Instant::now();
-    // `exec`: the killed process is the sleeping program itself.
+    // With `exec`, the killed process is the sleeping program itself.
     let mut camera = open(&format!("sh -c 'echo $$ > \"{}\"; exec sleep 60'", id_file.display()));
     assert!(matches!(camera.next_frame().unwrap_err().fault(), Some(Fault::Stale { .. })));
     let id = fs::read_to_string(&id_file).unwrap().trim().to_owned();
@@ -124,7 +124,7 @@ fn the_program_ends_with_its_camera() {
 
 #[test]
 fn the_newest_frame_of_a_fast_program_is_at_hand() {
-    // An endless stream: `yes` repeats its line, which is a picture of 1 × 1 pixel (the line feed is its third byte).
+    // An endless stream: `yes` repeats its line, which is a picture of 1 × 1 pixel whose third byte is the line feed.
     let mut latest = LatestFrame::spawn(open("yes 'P6 1 1 255 ab'"));
     let first = latest.next_frame().unwrap().unwrap();
     std::thread::sleep(Duration::from_millis(200));

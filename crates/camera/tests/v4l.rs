@@ -1,7 +1,7 @@
 //! Cameras of Video4Linux 2, read through real drivers: `make test-v4l` boots a kernel with them in QEMU.
 //!
-//! [`UsbCamera`] is a webcam simulated by the test; `uvcvideo`, the driver of all webcams, cannot distinguish it from a
-//! real one. `vivid` is the kernel's test camera; it draws eight colour bars, which verify the pixels.
+//! [`UsbCamera`] is a webcam simulated by the test; for `uvcvideo`, the driver of all webcams, it is the same as a real
+//! one. `vivid` is the kernel's test camera; it draws eight colour bars, by which the pixels are checked.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use usb_camera::UsbCamera;
 /// vivid's bars from left to right at 75 % (ITU-R BT.801): white, yellow, cyan, green, magenta, red, blue, black.
 const BARS: [[u8; 3]; 8] =
     [[191, 191, 191], [191, 191, 0], [0, 191, 191], [0, 191, 0], [191, 0, 191], [191, 0, 0], [0, 0, 191], [0, 0, 0]];
-/// Error of conversion to YUV in whole steps and back.
+/// Error of a conversion to whole steps of YUV and back.
 const MAX_ERROR: u8 = 4;
 
 fn vivid() -> Node {
@@ -38,7 +38,7 @@ fn try_open(address: &str, options: &OpenOptions) -> Result<Box<dyn Camera>, Cam
     sdg_camera::open(&address.parse::<Address>().unwrap(), options)
 }
 
-/// The mean colour of the middle of each bar, in the last rows: above them there is text.
+/// The mean colour of the centre of each bar in the last rows, below the text.
 fn bars(picture: &RgbImage) -> [[u8; 3]; 8] {
     let (width, height) = picture.dimensions();
     std::array::from_fn(|bar| {
@@ -59,7 +59,7 @@ fn assert_bars(frame: &Frame) {
     assert!(worst <= MAX_ERROR, "off by {worst}: expected {BARS:?}, found {found:?}");
 }
 
-/// Reads frames, checks that all are complete and of this size, and prints the rate.
+/// Reads frames, checks that all are complete and have this size, and prints the rate.
 fn read(camera: &mut dyn Camera, size: (u32, u32), count: u32) -> Vec<Frame> {
     let start = Instant::now();
     let frames: Vec<_> = (0..count).map(|_| camera.next_frame().unwrap().unwrap()).collect();
@@ -87,7 +87,7 @@ fn nodes_tell_their_formats_and_sizes() {
         let format = node.formats.iter().find(|format| format.encoding == Some(encoding)).unwrap();
         let Sizes::Listed(sizes) = &format.sizes else { panic!("vivid's webcam lists its sizes") };
         assert!(sizes.contains(&(640, 480)) && sizes.contains(&(1280, 720)), "{sizes:?}");
-        // As in vivid's table: larger frames have lower rates.
+        // As in vivid's table, larger frames have lower rates.
         let fps_of = |size| format.max_fps[sizes.iter().position(|listed| *listed == size).unwrap()];
         assert_eq!([fps_of((640, 480)), fps_of((1280, 720))], [25.0, 12.5], "{:?}", format.max_fps);
     }
@@ -97,7 +97,7 @@ fn nodes_tell_their_formats_and_sizes() {
 #[test]
 #[ignore = "needs vivid: make test-v4l"]
 fn yuyv_and_rgb_frames_have_the_bars_colours_and_the_format_can_change() {
-    // Opened by the driver's formats, by the name and by the path.
+    // Opened by the formats of the driver, by the name and by the path.
     let path = format!("v4l:{}", vivid().path.display());
     let changes = [
         ("v4l:vivid", 640, 480, Encoding::Yuyv),
@@ -132,7 +132,7 @@ fn frames_are_new_however_long_nobody_read() {
     let mut camera = try_open("v4l:vivid", &options(640, 480, Encoding::Yuyv)).unwrap();
     let first = read(camera.as_mut(), (640, 480), 3).pop().unwrap();
     std::thread::sleep(Duration::from_secs(1));
-    // The buffers were filled at once and are a second old; they are discarded.
+    // The buffers were filled immediately and are a second old; they are discarded.
     let second = camera.next_frame().unwrap().unwrap();
     assert!(second.number > first.number + 1, "{} after {}", second.number, first.number);
 }
@@ -172,7 +172,7 @@ fn a_camera_that_is_unplugged_comes_back() {
     inject("Disconnect");
     let gone = (0..10).find_map(|_| camera.next_frame().err()).expect("the device is gone");
     assert!(matches!(gone.fault(), Some(Fault::Gone { .. })), "{gone}");
-    // vivid reconnects itself when the last program has closed it.
+    // vivid reconnects itself after the last program has closed it.
     let frame = (0..20).find_map(|_| camera.next_frame().ok()).expect("it comes back").unwrap();
     assert!(matches!(frame.faults[..], [Fault::Back { .. }]), "{:?}", frame.faults);
     assert_bars(&frame);
@@ -197,7 +197,7 @@ fn webcam_options(width: u32, height: u32) -> OpenOptions {
 }
 
 fn open_webcam(options: &OpenOptions) -> Box<dyn Camera> {
-    // The kernel takes a moment to make the node.
+    // The kernel needs some time to create the node.
     let start = Instant::now();
     loop {
         match try_open("v4l:sdg test webcam", options) {
@@ -208,7 +208,7 @@ fn open_webcam(options: &OpenOptions) -> Box<dyn Camera> {
     }
 }
 
-/// JPEG at quality 95 with halved colour resolution, away from edges.
+/// JPEG at quality 95 with halved colour resolution, measured away from edges.
 const MAX_JPEG_ERROR: u8 = 8;
 
 fn assert_webcam(frame: &Frame) {

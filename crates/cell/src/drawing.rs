@@ -10,25 +10,26 @@ use sdg_report::{
 
 use crate::live_detection::Part;
 
-/// Default minimum score of accepted detections: scores are calibrated so that it separates right from wrong ones.
+/// Default minimum score of accepted detections. Scores are calibrated so that this value separates correct detections
+/// from wrong ones.
 pub const DEFAULT_MIN_SCORE: f64 = 0.5;
-/// The image with all detections drawn on it.
+/// Draws all detections on a copy of the image.
 pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {
     let mut drawn = image.clone();
     draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[]);
     drawn
 }
 
-/// Draws detections, which are ordered by decreasing score; those of at least `min_score` are drawn as accepted. If
-/// reasons are given, refused detections with a reason get a tag with score and reason that no other tag covers; other
-/// refused ones get only a box.
+/// Draws detections, which are ordered by decreasing score. Those with at least `min_score` are drawn as accepted. If
+/// reasons are given, a refused detection with a reason gets a tag with score and reason, which no other tag covers;
+/// the other refused ones get only a box.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,
     min_score: f64,
     reasons: &[(&GraspDetection, String)],
 ) {
-    // Worst first, so that the best is on top.
+    // In reverse order, so that the best detection is on top.
     for detection in detections.rev() {
         if detection.score < min_score && !reasons.is_empty() {
             let width = line_width(drawn);
@@ -49,15 +50,14 @@ pub fn draw_detections<'a>(
     }
 }
 
-/// Draws the visible parts of a frame, the best on top, with their scores and track numbers, which are shown counted
-/// from 1.
+/// Draws the visible parts of a frame, the best on top, with their scores and their track numbers, counted from 1.
 pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
     for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
         draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number + 1));
     }
 }
 
-/// Draws the frame of the searched region, unless the whole picture is searched.
+/// Draws the border of the searched region, unless the whole picture is searched.
 pub fn draw_region(drawn: &mut RgbImage, region: Option<&SearchRegion>) {
     let Some(region) = region else { return };
     let width = line_width(drawn);
@@ -83,12 +83,13 @@ fn draw_numbered(drawn: &mut RgbImage, detection: &GraspDetection, is_accepted: 
     draw_detection(drawn, &mark);
 }
 
-/// Colours of the dots where edges and surface differ; they also differ in lightness.
+/// Colours of the dots where edges or the surface differ; they differ in lightness, too, for colour-blind users.
 const EDGES: Color = Color([255, 40, 60]);
 const SURFACE: Color = Color([90, 150, 255]);
-/// Colour of the frames of squares in which a feature or print differs.
+/// Colour of the frames around squares in which a feature or print differs.
 const FEATURES: Color = Color([255, 190, 0]);
-/// Picture side in pixels up to which dots are one pixel wide; in larger pictures they grow in proportion.
+/// Side of a picture, in pixels, up to which dots are one pixel wide. In larger pictures, dots are proportionally
+/// wider.
 const DOT_PX_PER_SIDE: f64 = 400.0;
 
 /// Draws dots where edges (red) or the surface (blue) differ from the demonstration, frames (yellow) where a feature
@@ -118,14 +119,14 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     }
 }
 
-/// Writes score and reason below a detection's box, or farther down if another tag is there.
+/// Writes score and reason below a detection's box, or further down if there is another tag.
 fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
     let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
     let text = format!("{:.2} refused: {reason}", detection.score);
     let step = 2.4 * text_px;
     let height = f64::from(drawn.height());
     let below = |row: usize| {
-        // After the bottom of the picture it continues at the top.
+        // Below the bottom of the picture, the position wraps to the top.
         let y = (detection.bbox.y2 + 3.0 * text_px + row as f64 * step) % (height + step);
         Point2::new(detection.bbox.x1, y)
     };

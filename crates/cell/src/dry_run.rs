@@ -1,4 +1,4 @@
-//! A grasp planned from the arm's current posture, with the real sequence and limits; nothing moves.
+//! Plans a grasp from the arm's current posture, with the real sequence and limits, without moving the arm.
 
 use sdg_robot::{
     ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
@@ -16,12 +16,12 @@ pub struct DryRun {
     pub opening_m: f64,
     /// The planned motions.
     pub arm: PlannedArm,
-    /// The step that cannot be planned, and why.
+    /// The step that cannot be planned, and the reason.
     pub failed: Option<(GraspStep, String)>,
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of the arm; the part's pose is given if it is visible from there.
+    /// Plans the sequence from a state of the arm. The part's pose is given if the part is visible from there.
     ///
     /// # Errors
     /// A motion violates a limit, or the arm cannot apply a setting.

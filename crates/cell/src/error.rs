@@ -1,13 +1,13 @@
-//! Errors of perception in a cell.
+//! The errors of this crate.
 
 use sdg_calibration::CameraFileError;
 use sdg_grasp::GraspError;
 use sdg_robot::RobotError;
 
-/// Result of this crate.
+/// The result type of this crate.
 pub type Result<T> = std::result::Result<T, CellError>;
 
-/// Why perception cannot be set up, or a search fails.
+/// The reason why perception cannot be set up, or why a search fails.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CellError {
@@ -17,10 +17,10 @@ pub enum CellError {
     /// The camera's pose is unknown, or a picture is not from this camera.
     #[error(transparent)]
     Camera(#[from] CameraFileError),
-    /// The workcell mounts the camera on the hand, but the camera's file has no pose relative to the hand.
+    /// The workcell mounts the camera on the hand, but the camera file has no pose relative to the hand.
     #[error("expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand")]
     NotOnHand,
-    /// The workcell mounts the camera beside the robot, but the camera's file has no pose in the robot's base.
+    /// The workcell mounts the camera beside the robot, but the camera file has no pose in the robot's base frame.
     #[error("expected table: with frame: base, since the workcell mounts the camera beside the robot")]
     NotInBase,
     /// The search thread failed.

@@ -1,8 +1,8 @@
-//! Perception in the form that an arm's sequence needs.
+//! Perception as the sequence of an arm uses it.
 //!
 //! ```text
-//! Pictures ─ picture, when it was taken ─ Perception over the table ─ poses in the robot's base ─ GraspTarget
-//! Arm ─ state ─ place of a camera on the hand ──────┘
+//! Pictures ─ picture and its time ──────────── Perception ─ poses in the robot's base ─ GraspTarget
+//! Arm ─ state ─ pose of a camera on the hand ──────┘
 //! ```
 
 use std::ops::RangeInclusive;
@@ -23,7 +23,7 @@ use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 /// Maximum wait for a picture taken after the arm stopped.
 const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// A picture, with its capture time if time is measured by a clock.
+/// A picture, and its capture time if a clock measures time.
 #[derive(Debug, Clone)]
 pub struct TakenPicture {
     /// The picture.
@@ -34,10 +34,10 @@ pub struct TakenPicture {
 
 /// A source of pictures during a grasp.
 pub trait Pictures<A: Arm> {
-    /// Takes a picture after this call; the arm has stopped before.
+    /// Takes a picture that was captured after this call. The arm is at rest.
     ///
     /// # Errors
-    /// There is no such picture in time, or the camera fails.
+    /// No picture arrives in time, or the camera fails.
     fn take(&mut self, arm: &mut A) -> sdg_robot::Result<TakenPicture>;
 }
 
@@ -72,16 +72,16 @@ impl<A: Arm> Pictures<A> for LivePictures {
     }
 }
 
-/// Position of a part: its outline in the base frame, m, and the heights of the table and of the outline.
+/// The position of a part in the base frame: its outline, and the heights of the table and of the outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenOutline {
-    /// Corners, in metres.
+    /// Corners of the outline (x, y), in metres.
     pub outline_in_base: Vec<Point2<f64>>,
-    /// Heights of the table and of the outline, in metres.
+    /// z of the table and of the outline, in metres.
     pub z_m: [f64; 2],
 }
 
-/// A model behind a calibrated camera on or beside an arm.
+/// Finds the model's part with a calibrated camera on the arm's hand or beside the arm.
 #[derive(Debug)]
 pub struct ModelFinder<P> {
     pictures: P,
@@ -90,48 +90,48 @@ pub struct ModelFinder<P> {
     taken: Option<Instant>,
     /// Whether detections are checked against the demonstration.
     verification: Verification,
-    /// The last picture, and its detections, best first.
+    /// The last picture and its detections, best first.
     last: Option<(RgbImage, Vec<Found>)>,
     /// The best part of the last picture.
     seen: Option<SeenOutline>,
     /// The other accepted parts of the last picture.
     others: Vec<GraspTarget>,
-    /// Range of heights over the table at which parts may lie, m; `None` if they lie on the table.
+    /// Range of heights above the table at which parts may lie, in metres; `None` if parts lie on the table.
     heights_m: Option<RangeInclusive<f64>>,
     /// The pictures used for measuring heights, with their detections.
     sights: Vec<Sights>,
-    /// Places where parts are put down: parts lying there are not grasped.
+    /// Places where parts are put down. Parts that lie in them are not grasped.
     pub places: Vec<Place>,
 }
 
-/// A picture and its parts, each with the corners of its outline in the plane of [`Sighting::middle_m`], base frame, m.
+/// A picture and its parts, each with its outline in the plane at [`Sighting::middle_m`], in the base frame, in metres.
 #[derive(Debug)]
 struct Sights {
     picture: PosedPicture,
     parts: Vec<(Sighting, Polygon)>,
 }
 
-/// Range of heights over the table at which parts may lie if nothing is given, m.
+/// Range of heights above the table at which parts may lie, in metres, if no height is given.
 pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
-/// Margin of the searched sizes beyond those at the ends of the height range, for errors of poses.
+/// Margin of the range of searched sizes for errors of poses, relative to the sizes at the ends of the height range.
 const SIZE_LEEWAY: f64 = 0.03;
-/// Accuracy of a part's height as derived from its apparent size, m.
+/// Standard deviation of a part's height from its apparent size, in metres.
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
-/// In a picture for measuring a height, maximum distance of the part from its earlier position, m.
+/// Maximum distance of the part from its previous position in a picture for measuring a height, in metres.
 const SAME_PART_M: f64 = 0.040;
-/// If sizes by several demonstrations differ by more than this, they give no height.
+/// Maximum relative difference of the sizes in several demonstrations for which a height is derived from the size.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
-/// Maximum height of a part over its marks, m.
+/// Maximum height of a part above its marks, in metres.
 const TOP_LEEWAY_M: f64 = 0.002;
-/// The surface under a part is searched within this number of standard deviations of its expected height, between these
-/// bounds in m.
+/// Number of standard deviations around the expected height in which the surface below a part is searched.
 const SURFACE_SIGMAS: f64 = 3.5;
+/// Minimum and maximum of the searched distance, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
-/// Ratio of the radius that contains 68 % of position errors to their standard deviation along x and y.
+/// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
 
 impl<P> ModelFinder<P> {
-    /// Detects the model's part with this camera.
+    /// Creates a finder of the model's part with this camera.
     pub fn new(model: GraspModel, camera: MountedCamera, pictures: P) -> Self {
         let perception = Perception::of_any_camera(model);
         Self {
@@ -154,22 +154,23 @@ impl<P> ModelFinder<P> {
         Self { verification, ..self }
     }
 
-    /// Sets the heights over the table at which parts may lie, m: their apparent size then gives their height.
+    /// Sets the heights above the table at which parts may lie, in metres. The apparent size of a part then gives its
+    /// height.
     pub fn with_heights(self, heights_m: RangeInclusive<f64>) -> Self {
         Self { heights_m: Some(heights_m), ..self }
     }
 
-    /// The last picture, and its detections, best first.
+    /// The last picture and its detections, best first.
     pub fn last(&self) -> Option<(&RgbImage, &[Found])> {
         self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
 
-    /// Position of the best part in the last picture.
+    /// The position of the best part in the last picture.
     pub fn seen(&self) -> Option<&SeenOutline> {
         self.seen.as_ref()
     }
 
-    /// All parts in a picture, the best first.
+    /// All parts in a picture, best first.
     fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
     where
         P: Pictures<A>,
@@ -185,7 +186,7 @@ impl<P> ModelFinder<P> {
             sighting.at_height(height_m).target
         };
         let targets: Vec<GraspTarget> = sightings.iter().map(at_its_height).collect();
-        // The outline at the position where the best part was found.
+        // Moves the outline to the height of the best part.
         if let (Some(seen), Some(sighting), Some(target)) = (&mut self.seen, sightings.first(), targets.first()) {
             let higher_m = target.base_from_tcp.translation.z - sighting.target.base_from_tcp.translation.z;
             let share = 1.0 - higher_m / sighting.distance_m();
@@ -196,8 +197,8 @@ impl<P> ModelFinder<P> {
         Ok(targets)
     }
 
-    /// Takes a picture and finds all parts in it, best first, assuming that they lie this much higher than on the table
-    /// (m). If heights over the table (m) are given, parts at other heights are found too.
+    /// Takes a picture and finds all parts in it, best first, assuming that they lie `higher_m` above the table. If
+    /// `heights_m` is given, parts at these heights above the table are found as well.
     fn look<A: Arm>(
         &mut self,
         arm: &mut A,
@@ -215,7 +216,7 @@ impl<P> ModelFinder<P> {
         self.perception.move_to(&place)?;
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
         self.perception.set_sizes(heights_m.map(|heights_m| {
-            // A higher part is nearer to the camera, and appears larger.
+            // A higher part is nearer to the camera and appears larger.
             let size =
                 |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
             let [low, high] = [size(*heights_m.start()), size(*heights_m.end())];
@@ -228,12 +229,12 @@ impl<P> ModelFinder<P> {
         Ok(sightings)
     }
 
-    /// z of the marks of a part that lies on the table, m.
+    /// z of the marks of a part that lies on the table, in metres.
     fn marks_z_m(&self, place: &CameraOverTable) -> f64 {
         place.table_height_m + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
     }
 
-    /// A detection in the plane of the marks.
+    /// Converts a detection to a sighting in the plane of the marks.
     fn sighting(&self, found: &Found, place: &CameraOverTable) -> Option<Sighting> {
         let target = target(found)?;
         let marks_z_m = self.marks_z_m(place);
@@ -243,7 +244,7 @@ impl<P> ModelFinder<P> {
             None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
         };
         let pose = found.pose?;
-        // The effect of walls on a pose is due to the part's relief, and equal in both pictures.
+        // Walls shift a pose because of the part's relief, equally in both pictures: that error is not noise.
         let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
         Some(Sighting {
             camera_m: place.camera.world_from_camera.translation.vector.into(),
@@ -255,8 +256,8 @@ impl<P> ModelFinder<P> {
         })
     }
 
-    /// Size of a part in the plane of the marks relative to its own; `None` if demonstrations contradict each other, or
-    /// were not compared with the picture.
+    /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the demonstrations' sizes
+    /// differ, or if the picture was not compared with them.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();
@@ -290,7 +291,7 @@ impl<P> ModelFinder<P> {
         self.sights.push(Sights { picture: PosedPicture::new(picture, place.camera), parts });
     }
 
-    /// The height of the surface beside a part from two of the kept pictures.
+    /// Measures the height of the surface beside a part in two of the kept pictures.
     fn surface_of(&self, pair: &[Sighting; 2], expected: &MeasuredHeight) -> Option<MeasuredHeight> {
         let lengths = self.perception.model().facts().lengths?;
         let kept = |sighting: &Sighting| {
@@ -298,7 +299,7 @@ impl<P> ModelFinder<P> {
             self.sights.iter().find_map(|sights| Some((&sights.picture, &sights.parts.iter().find(shows)?.1)))
         };
         let ([one, other], [(first, outline), (second, _)]) = (*pair, [kept(&pair[0])?, kept(&pair[1])?]);
-        // The first picture's outline, at the height and position given by both pictures.
+        // The outline in the first picture, moved to the height and position that both pictures give.
         let marks_m = expected.height_m + lengths.mark_height_m;
         let [here, there] = [one.middle_at(marks_m), other.middle_at(marks_m)];
         let share = (one.camera_m.z - marks_m) / one.distance_m();
@@ -307,7 +308,7 @@ impl<P> ModelFinder<P> {
         let outline_m = Polygon { vertices: outline.vertices.iter().map(corner).collect() };
         let part = PartOnSurface {
             outline_m: &outline_m,
-            // Marks are at mid-height of a round bar and on top of other parts.
+            // A round bar's marks are at half its height; other parts' marks are on top.
             top_m: lengths.mark_height_m.max(2.0 * lengths.grasp_height_m) + TOP_LEEWAY_M,
             expected_m: expected.height_m,
             within_m: (SURFACE_SIGMAS * expected.sigma_m).clamp(SURFACE_WITHIN_M[0], SURFACE_WITHIN_M[1]),
@@ -322,7 +323,7 @@ impl<P> ModelFinder<P> {
     }
 }
 
-/// A detection in the form that the sequence uses.
+/// A detection as a target of the sequence.
 fn target(found: &Found) -> Option<GraspTarget> {
     let pose = found.pose?;
     Some(GraspTarget {

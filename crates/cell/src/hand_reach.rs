@@ -7,31 +7,31 @@ use sdg_kinematics::IkOptions;
 use sdg_kinematics::collision::{Body, Checker, CollisionError};
 use sdg_robot::workcell::Workcell;
 
-/// Number of hand turns that are tried over half a turn: with exchanged fingers the others are equivalent.
+/// Number of hand angles that are tried over 180 degrees. With the fingers exchanged, the other angles are equivalent.
 const NUM_TURNS: usize = 4;
-/// Distance kept from obstacles, m.
+/// Minimum distance from obstacles, in metres.
 const MARGIN_M: f64 = 0.003;
 
-/// Squares of the table, each with the number of hand turns that reach it.
+/// Squares of the table, each with the number of hand angles at which it is reached.
 pub struct Reach {
     /// All squares of the area.
     pub squares: Vec<Square>,
-    /// Width of a square, m.
+    /// Width of a square, in metres.
     pub grid_m: f64,
     height_m: f64,
 }
 
 /// A square of the table.
 pub struct Square {
-    /// Its middle in the base frame, m.
+    /// The centre in the base frame, in metres.
     pub at_m: Point2<f64>,
-    /// Number of hand turns that reach it.
+    /// Number of hand angles at which it is reached.
     pub num_turns: usize,
 }
 
 impl Reach {
-    /// Computes the reach in an area of the table (x and y in the base frame, m), with the tcp at a height over it,
-    /// among the workcell's obstacles and inside its workspace.
+    /// Computes the reach in an area of the table (x and y in the base frame, in metres), with the tcp at `height_m`
+    /// above the table, among the workcell's obstacles and inside its workspace.
     ///
     /// # Errors
     /// None for a workcell that was read from a file.
@@ -57,7 +57,8 @@ impl Reach {
         let area_m2 =
             |least: usize| self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2;
         let mut lines = vec![format!(
-            "with the tcp {:.0} mm over the table and the hand straight down, {:.2} m² of it are reached, {:.2} m² in every turn of the hand",
+            "with the tcp {:.0} mm above the table and the hand straight down, {:.2} m² of it are reached, {:.2} m² \
+             at every angle of the hand",
             self.height_m * 1e3,
             area_m2(1),
             area_m2(NUM_TURNS)
@@ -104,7 +105,7 @@ fn num_turns(workcell: &Workcell, checker: &mut Checker<'_>, at_m: Point2<f64>, 
         .count()
 }
 
-/// Whether some configuration reaches a pose, in either of the two equivalent hand turns, without collision and inside
+/// Whether a configuration reaches a pose, at either of the two equivalent hand angles, without collision and inside
 /// the workspace.
 fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f64>) -> bool {
     let arm = workcell.robot.geometry();

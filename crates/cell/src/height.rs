@@ -1,4 +1,4 @@
-//! How the height of parts is determined: measured by a camera on the hand, or given.
+//! Where the height of parts comes from: measured by a camera on the hand, or given.
 
 use sdg_grasp::GraspModel;
 use sdg_robot::CameraPose;
@@ -6,8 +6,8 @@ use sdg_robot::height::{GivenHeight, HeightMeasurement};
 
 use crate::mounted_camera::MountedCamera;
 
-/// How the height of a model's part is measured, with a camera on the hand and a model with known lengths; `told` is z
-/// in the base, m.
+/// The settings for measuring a part's height; `None` unless the camera is on the hand and the model knows lengths.
+/// `told` is the given z in the base frame, in metres.
 pub fn height_measurement(
     model: &GraspModel,
     camera: &MountedCamera,
@@ -19,8 +19,8 @@ pub fn height_measurement(
 }
 
 impl MountedCamera {
-    /// For a camera beside the robot: uses the given height of the marks (z in the base, m) in place of the model's
-    /// height over the table. A camera on the hand measures the height.
+    /// For a camera beside the robot: replaces the model's height above the table by the given height of the marks (z
+    /// in the base frame, in metres). A camera on the hand measures the height instead.
     pub fn with_marks_at(self, model: &GraspModel, told: Option<&GivenHeight>) -> Self {
         match (self.pose, model.facts().lengths, told) {
             (CameraPose::InBase(_), Some(lengths), Some(told)) => {

@@ -1,4 +1,4 @@
-//! Detects whether the jaws of a grasp would touch another part in the picture.
+//! Detects whether the jaws of a grasp would touch another part of the picture.
 //!
 //! ```text
 //!    ┌─────┐         jaw: from half the opening outwards, as long as a finger is wide
@@ -8,8 +8,8 @@
 //!    └───╱─┘
 //!       ╱ neighbour  its outline reaches under a jaw
 //! ```
-//! The jaws are as far open as marked. A hand that opens wider needs more room, and objects that the model was not
-//! taught are not detected: the absence of a warning guarantees nothing.
+//! The opening is the marked one. A hand that opens wider needs more space, and objects that the model was not taught
+//! are not detected: the absence of a warning is no guarantee.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarGrasp, Polygon};
@@ -18,23 +18,23 @@ use sdg_kinematics::{FINGER_HALF_WIDTH_M, finger_thickness_m};
 
 use crate::perception::Perception;
 
-/// Minimum covered share of a jaw's area that counts as contact: outlines are accurate to about a pixel. Chosen by
+/// Minimum covered fraction of a jaw's area that counts as contact; outlines are accurate to about a pixel. Chosen by
 /// hand.
 const MIN_COVERED: f64 = 0.03;
-/// Overlap above which two detections are readings of the same part. Chosen by hand.
+/// Minimum overlap of two detections of the same part. Chosen by hand.
 const SAME_PART: f64 = 0.5;
 
 /// A jaw seen from above, in pixels.
 #[derive(Debug, Clone, Copy)]
 struct Jaw {
-    /// Along the marked line.
+    /// Extent along the marked line.
     length: f64,
-    /// Across it.
+    /// Extent across the marked line.
     thickness: f64,
 }
 
 impl Jaw {
-    /// A finger of this width, with the thickness of the Franka hand's fingertips in proportion.
+    /// A jaw of this length along the line, with the proportions of the Franka hand's fingertips.
     fn of_length(length: f64) -> Self {
         Self { length, thickness: length * finger_thickness_m(0.0) / (2.0 * FINGER_HALF_WIDTH_M) }
     }
@@ -44,7 +44,7 @@ impl Jaw {
         let (sin, cos) = grasp.angle.radians().sin_cos();
         let (along, across) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
         [-1.0, 1.0].into_iter().any(|side| {
-            // In the jaw's frame, clipping the polygon against an image performs the cut.
+            // In the jaw's frame, the jaw is an image, to which the polygon is clipped.
             let in_jaw = |p: &Point2<f64>| {
                 let from_middle = p - grasp.center();
                 let out = side * across.dot(&from_middle) - 0.5 * grasp.width;
@@ -61,9 +61,9 @@ fn region(detection: &GraspDetection) -> Polygon {
 }
 
 impl Perception {
-    /// For each detection in a picture, in order, the indices of the detections whose parts its jaws touch. Fingers
-    /// have the Franka hand's size if the camera's pose is known; otherwise they are as wide as the marked line is
-    /// long.
+    /// For each detection in a picture, in order, the indices of the detections whose parts its jaws touch. If the
+    /// camera's pose is known, fingers have the size of the Franka hand's; otherwise they are as wide as the marked
+    /// line is long.
     pub fn touched_by_jaws(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         let regions: Vec<Polygon> = detections.iter().map(|detection| region(detection)).collect();
         let touched = |(idx, detection): (usize, &&GraspDetection)| {
@@ -79,7 +79,7 @@ impl Perception {
         detections.iter().enumerate().map(touched).collect()
     }
 
-    /// Length of the marked line on a detected part, in pixels: detections give only its middle.
+    /// Length of the marked line on a detected part, in pixels. A detection has only the line's midpoint.
     pub fn marked_length(&self, detection: &GraspDetection) -> f64 {
         let taught = &self.model().demonstrations()[0].marks;
         let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use sdg_geometry::{Angle, BoundingBox};
 
-    /// Jaws of 22 x 15 pixels that close over 20 pixels, from above and below at an angle of zero.
+    /// Jaws of 22 x 15 pixels that close on a part of 20 pixels, from above and from below at an angle of zero.
     fn touches(angle_deg: f64, part: [f64; 4]) -> bool {
         let grasp = PlanarGrasp { x: 100.0, y: 100.0, angle: Angle::from_degrees(angle_deg), width: 20.0 };
         let [x1, y1, x2, y2] = part;
@@ -106,15 +106,15 @@ mod tests {
         assert!(touches(0.0, [60.0, 60.0, 140.0, 85.0]));
         assert!(!touches(0.0, [60.0, 126.0, 140.0, 146.0]));
         assert!(!touches(0.0, [112.0, 60.0, 140.0, 140.0]));
-        // The space between the jaws is not covered.
+        // The space between the jaws is not part of them.
         assert!(!touches(0.0, [60.0, 92.0, 140.0, 108.0]));
-        // A neighbour that is smaller than a jaw, wholly under it.
+        // A neighbour that is smaller than a jaw, completely below it.
         assert!(touches(0.0, [98.0, 114.0, 104.0, 119.0]));
     }
 
     #[test]
     fn jaws_turn_with_the_grasp() {
-        // A quarter turn: x from 75 to 90 and from 110 to 125.
+        // Rotated by 90 degrees: x from 75 to 90 and from 110 to 125.
         assert!(touches(90.0, [112.0, 60.0, 140.0, 140.0]));
         assert!(!touches(90.0, [60.0, 126.0, 140.0, 146.0]));
     }

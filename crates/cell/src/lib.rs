@@ -19,7 +19,7 @@ mod sequence_run;
 mod surface;
 mod workcell_map;
 
-// The crates whose types appear in this crate's interface: a program needs only this dependency.
+// Crates whose types are in this crate's interface, so that a program needs only this dependency.
 pub use image;
 pub use sdg_calibration as calibration;
 pub use sdg_demonstration as demonstration;

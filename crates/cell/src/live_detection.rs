@@ -1,4 +1,4 @@
-//! Detection in a camera's frames: in each frame independently, or with tracking from frame to frame.
+//! Detection in a camera's frames: in each frame independently, or with tracking across frames.
 
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -14,9 +14,9 @@ use crate::perception::{Found, Perception};
 /// Maximum wait for the newest frame.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// The frames of a camera: the newest frame of a stream, or every frame of stored, rendered and on-request pictures.
+/// The frames of a camera: the newest frame of a stream; or every frame of stored, rendered and on-request pictures.
 pub enum Frames {
-    /// Frames that were not taken are replaced by newer ones.
+    /// The newest frame. Frames that were not read in time are dropped.
     Newest(LatestFrame),
     /// Every frame in order.
     Each(Box<dyn Camera>),
@@ -29,7 +29,7 @@ pub enum Next {
     Frame(Frame),
     /// No frame yet.
     None,
-    /// There are no more frames.
+    /// There are no further frames.
     End,
     /// A fault of the camera.
     Error(CameraError),
@@ -50,7 +50,7 @@ impl Frames {
         matches!(self, Self::Each(camera) if camera.is_on_request())
     }
 
-    /// The next frame, with a short wait.
+    /// The next frame, after a short wait.
     pub fn take(&mut self) -> Next {
         match self {
             Self::Newest(newest) => match newest.take(MAX_WAIT) {
@@ -68,12 +68,12 @@ impl Frames {
     }
 }
 
-/// A part in a frame, and its track.
+/// A part in a frame and its track.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// The detection.
     pub found: Found,
-    /// Number and state of its track, and the time since the part was last seen.
+    /// Number and state of the track, and the time since the part was last visible.
     pub track: Option<(u64, TrackState, Duration)>,
 }
 
@@ -87,23 +87,23 @@ impl Part {
     }
 }
 
-/// Detects the parts of a frame, with or without using earlier frames.
+/// Detects the parts of a frame, with or without previous frames.
 pub struct FrameDetector {
     detector: Perception,
     verification: Verification,
     tracker: Option<LiveTracker>,
     /// The time between stored pictures; `None` if frames have their own times.
     interval: Option<Duration>,
-    /// Reference for the frame times.
+    /// The time from which frame times are measured.
     first: Option<SystemTime>,
 }
 
-/// Interval for stored pictures without a frame rate, which need not be consecutive.
+/// Interval for stored pictures without a frame rate, which may be unrelated.
 const UNRELATED: Duration = Duration::from_secs(1);
 
 impl FrameDetector {
-    /// `tracking` configures tracking; `None` searches each frame independently. `frames_wait`: frames are produced
-    /// only on request.
+    /// Creates a detector. `tracking` configures tracking; `None` searches each frame independently. `frames_wait` is
+    /// true if frames are produced only on request.
     ///
     /// # Errors
     /// The model cannot be tracked.
@@ -114,7 +114,7 @@ impl FrameDetector {
         address: &Address,
         frames_wait: bool,
     ) -> Result<Self> {
-        // A file's modification time is not the capture time of its picture.
+        // The modification time of a file is not the capture time of its picture.
         let interval = match address {
             Address::Folder { playback, .. } | Address::File { playback, .. } => {
                 Some(playback.interval.unwrap_or(UNRELATED))

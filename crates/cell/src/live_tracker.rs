@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
-//!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
-//!                                └ the frame does not follow from the one before: searched here, before it is answered
+//!                                │ search due ─ channel ─ search thread ─ channel ─ result used before the next frame
+//!                                └ not continuous with the previous frame: searched at once, on the caller's thread
 //! ```
-//! So a frame waits for at most one search, while another one may run on the search thread.
+//! So a frame waits for at most one search, while another search may run on the search thread.
 //!
-//! The duration of a search varies, and its result is carried forward. For reproducible tests, [`SearchTime::Frames`]
-//! runs each search on the caller's thread and delivers its result a fixed number of frames later.
+//! The duration of a search varies, and its result is moved to the current frame. For reproducible tests,
+//! [`SearchTime::Frames`] runs each search on the caller's thread and delivers its result a fixed number of frames
+//! later.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -26,9 +27,9 @@ const ENDED: CellError = CellError::SearchThread("ended");
 /// The thread and timing of searches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchTime {
-    /// On a separate thread, with their real duration.
+    /// On a separate thread, with their real durations.
     AsItTakes,
-    /// On the caller's thread; the tracker gets the result this number of frames after the searched one, at least one.
+    /// On the caller's thread. The tracker gets the result this number of frames after the searched one, at least one.
     Frames(u32),
 }
 
@@ -40,23 +41,23 @@ pub struct LiveTracker {
 
 enum Searches {
     Threaded {
-        /// `None` once the thread must end.
+        /// The channel to the search thread; `None` when the thread must end.
         due: Option<Sender<PartSearch>>,
         done: Receiver<SearchOutcome>,
         thread: Option<JoinHandle<()>>,
     },
     Delayed {
         frames: u32,
-        /// The search's result, and the number of frames until it is delivered.
+        /// The result of the search, and the number of frames until it is delivered.
         outcome: Option<(SearchOutcome, u32)>,
     },
 }
 
 impl LiveTracker {
-    /// A tracker without known parts; it starts the search thread.
+    /// Creates a tracker without known parts, and starts the search thread.
     ///
     /// # Errors
-    /// The system refuses a thread.
+    /// The operating system provides no thread.
     pub fn new(perception: &Perception, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
         let searches = match search_time {
             SearchTime::AsItTakes => {
@@ -78,8 +79,8 @@ impl LiveTracker {
         Ok(Self { tracker: Tracker::new(perception.to_part_detector(), config), searches })
     }
 
-    /// Tracks all known parts into a frame. If the frame is not a continuation of the previous one, it is searched
-    /// first; otherwise due searches run on the other thread. `captured` is measured from any fixed time.
+    /// Tracks all known parts into a frame. A frame that does not continue the previous one is searched first;
+    /// otherwise due searches run on the other thread. `captured` is measured from any fixed time.
     ///
     /// # Errors
     /// Errors of a search, for example a picture that is too small.
@@ -136,7 +137,7 @@ impl Drop for LiveTracker {
         if let Searches::Threaded { due, thread, .. } = &mut self.searches {
             due.take();
             if let Some(thread) = thread.take() {
-                // The message of a panic in a search was printed already.
+                // If a search panicked, its message was already printed.
                 let _ = thread.join();
             }
         }

@@ -8,22 +8,22 @@ use sdg_robot::CameraPose;
 
 use crate::error::{CellError, Result};
 
-/// A calibrated camera and its mounting.
+/// A calibrated camera and its mount.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MountedCamera {
     /// The intrinsics and picture size.
     pub intrinsics: PinholeCamera,
-    /// The pose relative to its mounting.
+    /// The pose relative to the mount.
     pub pose: CameraPose,
-    /// The table's z in the robot's base, in metres.
+    /// The table's z in the robot's base frame, in metres.
     pub table_height_m: f64,
 }
 
 impl MountedCamera {
-    /// The camera of a file, mounted as defined in a workcell.
+    /// The camera of a file, mounted as the workcell defines.
     ///
     /// # Errors
-    /// [`CellError::NotOnHand`] and [`CellError::NotInBase`] if the file lacks the pose for this mounting.
+    /// [`CellError::NotOnHand`] or [`CellError::NotInBase`] if the file lacks the pose for this mount.
     pub fn new(camera: &CalibratedCamera, mount: Mount, table_height_m: f64) -> Result<Self> {
         let pose = match (mount, camera.flange_from_camera, &camera.table) {
             (Mount::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
@@ -34,12 +34,12 @@ impl MountedCamera {
         Ok(Self { intrinsics: camera.intrinsics, pose, table_height_m })
     }
 
-    /// Width and height of its pictures.
+    /// Width and height of the pictures, in pixels.
     pub fn size_px(&self) -> [u32; 2] {
         [self.intrinsics.width, self.intrinsics.height]
     }
 
-    /// The camera over the table, in the robot's base, while the flange is at `base_from_flange`.
+    /// The camera above the table, in the robot's base frame, with the flange at `base_from_flange`.
     pub fn over_table(&self, base_from_flange: &Isometry3<f64>) -> CameraOverTable {
         let world_from_camera = match self.pose {
             CameraPose::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,

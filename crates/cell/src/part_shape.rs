@@ -1,11 +1,11 @@
-//! The shape of the part that a model was taught from, in the form that the sequence uses.
+//! The shape of the taught part, as the sequence uses it.
 
 use nalgebra::Point2;
 use sdg_grasp::GraspModel;
 use sdg_robot::PartShape;
 
-/// `Some` if the model knows lengths and its first demonstration has an outline; otherwise the camera measures the
-/// width between the fingers.
+/// The part's shape, if the model knows lengths and its first demonstration has an outline; otherwise `None`, and the
+/// camera measures the width between the fingers.
 pub fn part_shape(model: &GraspModel) -> Option<PartShape> {
     let lengths = model.facts().lengths?;
     let marks = &model.demonstrations().first()?.marks;
@@ -13,12 +13,12 @@ pub fn part_shape(model: &GraspModel) -> Option<PartShape> {
     let (start, end) = (marks.grasp.start, marks.grasp.end);
     let along = (end - start).try_normalize(0.0)?;
     let middle = nalgebra::center(&start, &end);
-    // Pictures have y down, as does the grasp's frame seen from above.
+    // y points down in pictures, as it does in the grasp frame seen from above.
     let in_grasp = |p: &Point2<f64>| {
         let from_middle = (p - middle) / lengths.pixels_per_m;
         Point2::new(along.dot(&from_middle), along.perp(&from_middle))
     };
-    // Marks are at mid-height of a round bar and on top of other parts.
+    // A round bar's marks are at half its height; other parts' marks are on top.
     let top_m = lengths.mark_height_m.max(2.0 * lengths.grasp_height_m);
     let width_m = marks.width_px / lengths.pixels_per_m;
     PartShape::new(outline.vertices.iter().map(in_grasp), width_m, top_m, lengths.grasp_height_m).ok()

@@ -1,4 +1,4 @@
-//! A grasp model with a camera of known pose, or for pictures of any camera.
+//! A grasp model for a camera with a known pose, or for pictures of any camera.
 
 use std::ops::RangeInclusive;
 
@@ -16,7 +16,7 @@ use crate::error::Result;
 
 /// Detects grasps in pictures: in pixels, and also in metres if the camera and its pose are known.
 ///
-/// All callers use it: the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
+/// Used by all callers: the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
 #[derive(Debug, Clone)]
 pub struct Perception {
     view: View,
@@ -27,20 +27,21 @@ pub struct Perception {
 enum View {
     /// Pictures of any camera.
     AnyCamera(Box<GraspModel>),
-    /// Pictures of a calibrated camera with a pose; also the original model, for a camera without a pose.
+    /// Pictures of a calibrated camera with a pose. The detector also has the original model, for a camera without a
+    /// pose.
     OverTable(Box<PlanViewDetector>, CameraOverTable),
 }
 
-/// A detection, with its pose in metres if the camera's pose is known.
+/// A detection, and its pose in metres if the camera's pose is known.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// In pixels of the picture as given.
+    /// The detection, in pixels of the picture as given.
     pub detection: GraspDetection,
-    /// In the world frame of the camera's pose.
+    /// The pose of the grasp in the world frame of the camera's pose.
     pub pose: Option<PlanarPose>,
 }
 
-/// The camera over its table as given in its file, and the frame of that pose.
+/// The camera above its table according to its file, and the frame of that pose.
 ///
 /// # Errors
 /// The file has no pose of the camera.
@@ -51,12 +52,13 @@ pub fn camera_over_table(camera: &CalibratedCamera) -> std::result::Result<(Came
 }
 
 impl Perception {
-    /// For pictures of any camera: grasps are in pixels.
+    /// Perception for pictures of any camera. Grasps are in pixels.
     pub fn of_any_camera(model: GraspModel) -> Self {
         Self { view: View::AnyCamera(Box::new(model)), frame: None }
     }
 
-    /// For a calibrated camera with a known pose: grasps are also in metres in the world frame of that pose.
+    /// Perception for a calibrated camera with a known pose. Grasps are also in metres, in the world frame of that
+    /// pose.
     ///
     /// # Errors
     /// The model was taught without a camera, or the camera does not see the plane of the marks.
@@ -64,19 +66,19 @@ impl Perception {
         Ok(Self { view: View::OverTable(Box::new(PlanViewDetector::new(model, place)?), *place), frame: None })
     }
 
-    /// The same with the pose in the camera's file.
+    /// Like [`Self::over_table`], with the pose in the camera file.
     ///
     /// # Errors
-    /// Those of [`Self::over_table`]; the file has no pose of the camera.
+    /// The errors of [`Self::over_table`]; or the file has no pose of the camera.
     pub fn calibrated(model: GraspModel, camera: &CalibratedCamera) -> Result<Self> {
         let (place, frame) = camera_over_table(camera)?;
         Ok(Self { frame: Some(frame), ..Self::over_table(model, &place)? })
     }
 
-    /// Continues with another pose of the camera, or with another camera.
+    /// Changes the pose of the camera, or the camera.
     ///
     /// # Errors
-    /// Those of [`Self::over_table`]; the pose is then unchanged.
+    /// The errors of [`Self::over_table`]; the pose is then unchanged.
     pub fn move_to(&mut self, place: &CameraOverTable) -> Result<()> {
         match &mut self.view {
             View::AnyCamera(model) => *self = Self::over_table(GraspModel::clone(model), place)?,
@@ -88,8 +90,8 @@ impl Perception {
         Ok(())
     }
 
-    /// Searches for parts of these sizes in the plane of the marks, relative to the part's own, as
-    /// [`PlanViewDetector::set_sizes`]; no effect for pictures of any camera.
+    /// Sets the sizes to search in the plane of the marks, relative to the part's size; see
+    /// [`PlanViewDetector::set_sizes`]. Has no effect for pictures of any camera.
     ///
     /// # Errors
     /// The range is invalid.
@@ -100,12 +102,12 @@ impl Perception {
         }
     }
 
-    /// Restricts the search to this region, in pixels of the pictures, in place of the model's region; `None` searches
+    /// Restricts the search to this region, in pixels of the pictures, instead of the model's region; `None` searches
     /// the whole picture.
     ///
     /// # Errors
-    /// The region is empty, is not inside these pictures, as far as their size is known, or is too small for the part;
-    /// nothing is changed then.
+    /// The region is empty, is not inside the pictures (if their size is known), or is too small for the part. The
+    /// previous region is then kept.
     pub fn look_in(&mut self, region: Option<SearchRegion>) -> Result<()> {
         match &mut self.view {
             View::AnyCamera(model) => **model = GraspModel::clone(model).with_region(region)?,
@@ -122,10 +124,10 @@ impl Perception {
         }
     }
 
-    /// Detects the part in a picture, best score first.
+    /// Detects the part in a picture; the detections are ordered by decreasing score.
     ///
     /// # Errors
-    /// The picture's size differs from that of the calibrated camera or of the region; errors of the model.
+    /// The picture's size differs from the size for the calibrated camera or for the region; or the model fails.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         self.check_picture(picture)?;
         Ok(match &self.view {
@@ -140,10 +142,10 @@ impl Perception {
         })
     }
 
-    /// Checks that a picture can be from the calibrated camera, and that the region is inside it.
+    /// Checks that a picture can be from the calibrated camera, and that the region is inside the picture.
     ///
     /// # Errors
-    /// The picture has another size, or the region is not inside it.
+    /// The picture has a different size, or the region is not inside it.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         self.check_size(picture)?;
         if let Some(region) = self.region() {
@@ -175,7 +177,7 @@ impl Perception {
         self.camera_over_table().map(|place| [place.camera.intrinsics.width, place.camera.intrinsics.height])
     }
 
-    /// Orientation of its pictures: a calibration refers to the sensor's pixels.
+    /// Orientation of the pictures: a calibration refers to the sensor's pixels.
     pub fn pixel_frame(&self) -> PixelFrame {
         match self.view {
             View::AnyCamera(_) => PixelFrame::Upright,
@@ -183,12 +185,12 @@ impl Perception {
         }
     }
 
-    /// The frame of positions, as given in the camera's file.
+    /// The frame of positions, as named in the camera file.
     pub fn frame(&self) -> Option<Frame> {
         self.frame
     }
 
-    /// The model, with known size if the camera's pose is known.
+    /// The model; its size is known if the camera's pose is known.
     pub fn model(&self) -> &GraspModel {
         match &self.view {
             View::AnyCamera(model) => model,
@@ -196,7 +198,7 @@ impl Perception {
         }
     }
 
-    /// The same in the form for a tracker.
+    /// The detector for a tracker.
     pub fn to_part_detector(&self) -> PartDetector {
         match &self.view {
             View::AnyCamera(model) => GraspModel::clone(model).into(),
@@ -204,8 +206,8 @@ impl Perception {
         }
     }
 
-    /// The part's size in a picture relative to its size in the photo; `None` if that is meaningless: with a calibrated
-    /// camera, or without the check.
+    /// The part's size in a picture relative to its size in the photo; `None` with a calibrated camera, where this
+    /// ratio has no meaning, or without the check.
     pub fn size_of(&self, detection: &GraspDetection, picture_size: [u32; 2]) -> Option<f64> {
         match &self.view {
             View::AnyCamera(model) => model.size_of(detection, picture_size),
@@ -213,7 +215,7 @@ impl Perception {
         }
     }
 
-    /// The differences between a picture and the demonstration for each detection; `None` as for [`Self::size_of`].
+    /// The differences between a picture and the demonstration for each detection; `None` as in [`Self::size_of`].
     pub fn differences(&self, picture: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
         match &self.view {
             View::AnyCamera(model) => model.differences(picture, detections),
@@ -221,7 +223,7 @@ impl Perception {
         }
     }
 
-    /// Length of a pixel in the plane of the marks, in metres, if the camera's pose is known.
+    /// Length of a pixel in the plane of the marks, in metres; `None` if the camera's pose is unknown.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
         match &self.view {
             View::AnyCamera(_) => None,
@@ -229,8 +231,8 @@ impl Perception {
         }
     }
 
-    /// The middles of the grasps of those demonstrations that come from this picture, in its pixels; `find` receives
-    /// the picture in the form in which the model was taught it.
+    /// The grasp points of the demonstrations that were taught from this picture, in its pixels. `find` receives the
+    /// picture in the form used for teaching.
     ///
     /// # Errors
     /// The picture's size differs from that of the calibrated camera.

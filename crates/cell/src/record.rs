@@ -6,32 +6,32 @@ use serde::Serialize;
 
 use crate::perception::{Found, Perception};
 
-/// A detection and, with a camera, its pose.
+/// A detection, and its pose if the camera is calibrated.
 #[derive(Debug, Clone, Serialize)]
 pub struct FoundRecord {
-    /// In pixels.
+    /// The detection, in pixels.
     #[serde(flatten)]
     pub detection: DetectionRecord,
-    /// In metres; absent without a calibrated camera.
+    /// The pose, in metres; absent without a calibrated camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseRecord>,
 }
 
-/// Pose of the grasp in metres and degrees; the rotation is about the frame's z. The position is within `sigma_mm` and
-/// the rotation within `sigma_deg` with a probability of 68 % each.
+/// Pose of the grasp in metres and degrees. The position is within `sigma_mm`, and the rotation within `sigma_deg`,
+/// with a probability of 68 % each.
 #[derive(Debug, Clone, Serialize)]
 pub struct PoseRecord {
-    /// The frame of the pose in the camera's file.
+    /// The frame of the pose, as named in the camera file.
     pub frame: Frame,
     /// Grasp point in that frame, in metres.
     pub p_m: [f64; 3],
-    /// Rotation about the frame's z, right-handed.
+    /// Right-handed rotation about the frame's z, in degrees.
     pub yaw_deg: f64,
-    /// Distance between the jaws for the part's width, in metres.
+    /// Distance between the jaws when they touch the part, in metres.
     pub opening_m: f64,
-    /// Standard deviation of the position.
+    /// Radius that contains the position with a probability of 68 %, in millimetres.
     pub sigma_mm: f64,
-    /// Standard deviation of the rotation.
+    /// Half width of the range that contains the rotation with a probability of 68 %, in degrees.
     pub sigma_deg: f64,
 }
 

@@ -1,26 +1,26 @@
-//! Runs a grasp, with or without placing, in one call.
+//! Runs a grasp, optionally with placing, in one call.
 
 use sdg_robot::{
     CameraPose, CompliantArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, PartFinder, PlaceGoal, PlaceOffset,
     PlacingConfig, PlacingOutcome, Robot, Touched, grasp_and_place, grasp_softly,
 };
 
-/// Result of a sequence.
+/// The result of a sequence.
 pub struct Ended {
     /// The grasp.
     pub grasp: GraspReport,
-    /// The step that failed, and why; `None` if everything succeeded.
+    /// The step that failed, and the reason; `None` if all steps succeeded.
     pub failed: Option<(GraspStep, String)>,
-    /// Offset of the part from its place at the last look, if a place was given.
+    /// Offset of the placed part from its place, measured in the last picture; `None` if no place was given.
     pub beside: Option<PlaceOffset>,
-    /// Contact each time the part was put down.
+    /// The contact at each placing.
     pub touched: Vec<Touched>,
 }
 
 /// Grasps the part and, if a place is given, puts it there.
 ///
 /// # Errors
-/// As [`sdg_robot::grasp`].
+/// The errors of [`sdg_robot::grasp`].
 pub fn run_sequence<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,

@@ -1,49 +1,52 @@
-//! The height of the surface beside a part, from two pictures of it.
+//! Measures the height of the surface beside a part from two pictures.
 //!
 //! ```text
-//! outline of the part ─ windows around it, the nearest first, except where the part hides them from a camera
-//! window ─ at each height: both pictures resampled there ─ correlation ─ the height of its one clear maximum
-//! heights of the windows ─ the highest one that many windows all around the part share ─ SurfaceHeight
+//! outline of the part ─ windows around it, the nearest first, without those that the part hides from a camera
+//! window ─ at each height: both pictures resampled there ─ correlation ─ the height of the only clear maximum
+//! heights of the windows ─ the highest that many windows on all sides have in common ─ SurfaceHeight
 //! ```
-//! The part's own edges are anywhere between its bottom and its top, and which of them match between pictures depends
-//! on the view. The surface beside it is one plane, and so are the grain, scratches, shadows and edges on it.
+//! The part's own edges are anywhere between its bottom and its top, and the edges that match between two pictures
+//! depend on the view. The surface beside it is a single plane, together with the grain, scratches, shadows and edges
+//! on it.
 //!
-//! Not included: parts and their poses.
+//! Not in this module: parts and their poses.
 
 use image::RgbImage;
 use nalgebra::{Point2, Point3, Vector2};
 use sdg_geometry::{Polygon, PosedCamera, median};
 
-/// Radius of a window, m.
+/// Radius of a window, in metres.
 const WINDOW_M: f64 = 0.005;
-/// Spacing of the samples in a window, m: about a pixel of a VGA camera from 0.3 m.
+/// Spacing of the samples in a window, in metres: about a pixel of a VGA camera at 0.3 m.
 const SAMPLE_M: f64 = 0.0006;
-/// Spacing of the windows, m.
+/// Spacing of the windows, in metres.
 const WINDOWS_APART_M: f64 = 0.004;
-/// Minimum and maximum distance of a window from the outline, m.
+/// Minimum and maximum distance of a window from the outline, in metres.
 const WINDOW_DISTANCE_M: [f64; 2] = [0.002, 0.040];
-/// Step between the tested heights, m: half a pixel of disparity.
+/// Step between the tested heights, in metres: half a pixel of disparity.
 const STEP_M: f64 = 0.0005;
-/// Minimum correlation of both pictures at a window's height; and, beyond a distance from that height in m, the
-/// required drop of the correlation.
+/// Minimum correlation of both pictures at a window's height.
 const MIN_CORRELATION: f64 = 0.8;
+/// Minimum decrease of the correlation at distances above [`LEAD_BEYOND_M`] from that height.
 const MIN_LEAD: f64 = 0.15;
 const LEAD_BEYOND_M: f64 = 0.003;
-/// Maximum and minimum number of windows, taken from the nearest, that determine the surface.
+/// Maximum number of windows that determine the surface, the nearest ones.
 const MAX_WINDOWS: usize = 60;
+/// Minimum number of windows on a surface.
 const MIN_WINDOWS: usize = 5;
-/// Maximum distance of a window's height from the median of its surface, m; and number of iterations of the median.
+/// Maximum distance of a window's height from the median of its surface, in metres.
 const INLIER_M: f64 = 0.001;
+/// Number of iterations of the median.
 const NUM_SHIFTS: usize = 4;
-/// Minimum share of all windows on a surface.
+/// Minimum fraction of all windows that must be on the surface.
 const MIN_SHARE: f64 = 0.3;
-/// Minimum number of the four quadrants around the part that contain windows of the surface: an object beside the part
-/// is only on one side.
+/// Minimum number of quadrants around the part, of four, with windows on the surface. An object beside the part is only
+/// on one side.
 const MIN_QUADRANTS: usize = 3;
-/// Overlapping windows are not independent: this number of them counts as one.
+/// Number of windows that count as one, because windows overlap and are not independent.
 const WINDOWS_PER_VOTE: f64 = 4.0;
-/// Resampling error common to all windows, m. Fitted together with WINDOWS_PER_VOTE by `heights`, so that errors
-/// divided by their sigmas have a spread of 1.
+/// Resampling error common to all windows, in metres. Fitted together with [`WINDOWS_PER_VOTE`] by `heights`, so that
+/// the ratio of errors to their sigmas has a standard deviation of 1.
 const COMMON_SIGMA_M: f64 = 0.12e-3;
 
 /// A picture and its camera.
@@ -56,22 +59,23 @@ pub(crate) struct PosedPicture {
     gray: Vec<f32>,
 }
 
-/// z of a surface.
+/// The height z of a surface and its standard deviation, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceHeight {
     pub(crate) height_m: f64,
     pub(crate) sigma_m: f64,
 }
 
-/// Prior knowledge of the part.
+/// Knowledge of the part before the measurement.
 #[derive(Debug, Clone)]
 pub(crate) struct PartOnSurface<'a> {
-    /// Its outline from above, base frame, m.
+    /// The part's outline from above, in the base frame, in metres.
     pub(crate) outline_m: &'a Polygon,
-    /// Height of its top over the surface, m, which determines what it hides.
+    /// Height of the part's top above the surface, in metres; it determines which windows the part hides.
     pub(crate) top_m: f64,
-    /// Expected height of the surface, m, and the searched distance from it.
+    /// Expected height of the surface, in metres.
     pub(crate) expected_m: f64,
+    /// Maximum distance of the searched heights from the expected one, in metres.
     pub(crate) within_m: f64,
 }
 
@@ -85,13 +89,13 @@ impl PosedPicture {
         Self { camera, width, height, gray: gray.collect() }
     }
 
-    /// Brightness of a window's samples at a height; false if the window is not completely in the picture.
+    /// Samples the brightness of a window at a height; false if the window is not completely in the picture.
     fn sample(&self, middle: &Point2<f64>, height_m: f64, offsets: &[Vector2<f64>], into: &mut Vec<f32>) -> bool {
         into.clear();
         let project = |p: Point2<f64>| self.camera.project(&Point3::new(p.x, p.y, height_m));
         let ends = [Vector2::new(WINDOW_M, 0.0), Vector2::new(0.0, WINDOW_M)].map(|end| project(middle + end));
         let (Some(at), [Some(right), Some(up)]) = (project(*middle), ends) else { return false };
-        // For such a small window, a linear map is exact enough.
+        // In such a small window, a linear map is accurate enough.
         let (by_x, by_y) = ((right - at) / WINDOW_M, (up - at) / WINDOW_M);
         for offset in offsets {
             let p = at + by_x * offset.x + by_y * offset.y - Vector2::new(0.5, 0.5);
@@ -110,7 +114,7 @@ impl PosedPicture {
     }
 }
 
-/// The height of the surface beside a part; `None` if there is no texture, or several surfaces.
+/// The height of the surface beside a part; `None` if it has no texture, or if there are several surfaces.
 pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Option<SurfaceHeight> {
     let offsets = window();
     let mut windows: Vec<(Point2<f64>, f64)> = Vec::new();
@@ -124,12 +128,12 @@ pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<
     }
     let center = part.outline_m.centroid();
     let min_windows = MIN_WINDOWS.max((MIN_SHARE * windows.len() as f64).ceil() as usize);
-    // The surface that carries the part is higher than its surroundings.
+    // The highest surface comes first: the one that carries the part is higher than its surroundings.
     windows.sort_by(|one, other| other.1.total_cmp(&one.1));
     windows.iter().find_map(|(_, height_m)| one_surface(&windows, *height_m, &center, min_windows))
 }
 
-/// The surface of the windows at about a height, if there are enough of them around the part.
+/// The surface of the windows near a height, if there are enough of them around the part.
 fn one_surface(
     windows: &[(Point2<f64>, f64)],
     about_m: f64,
@@ -155,7 +159,7 @@ fn one_surface(
     Some(SurfaceHeight { height_m, sigma_m })
 }
 
-/// Samples of a window, from its middle.
+/// The samples of a window, relative to its centre.
 fn window() -> Vec<Vector2<f64>> {
     let reach = (WINDOW_M / SAMPLE_M).floor() as i32;
     let side = -reach..=reach;
@@ -165,7 +169,7 @@ fn window() -> Vec<Vector2<f64>> {
         .collect()
 }
 
-/// Centres of windows beside the part that are not hidden from either camera, the nearest first.
+/// The centres of windows beside the part that both cameras see, the nearest first.
 fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2<f64>> {
     let outline = part.outline_m;
     let bounds = outline.bounds();
@@ -177,7 +181,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
     let is_clear = |p: &Point2<f64>| {
         pictures.iter().all(|picture| {
             let camera_m = picture.camera.world_from_camera.translation.vector;
-            // Upwards, a line of sight approaches the camera.
+            // Going up, a line of sight approaches the camera.
             let slope = (camera_m.xy() - p.coords) / (camera_m.z - part.expected_m);
             [0.5, 1.0].into_iter().all(|share| {
                 let above = p + slope * (share * part.top_m);
@@ -195,7 +199,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
     beside.into_iter().map(|(_, p)| p).collect()
 }
 
-/// The single height at which both pictures agree in a window.
+/// The height at which both pictures agree in a window, if it is unambiguous.
 fn height_of_window(
     pictures: [&PosedPicture; 2],
     middle: &Point2<f64>,
@@ -231,9 +235,9 @@ fn height_of_window(
     Some(lowest_m + (best_idx as f64 + shift) * STEP_M)
 }
 
-/// Normalised cross-correlation; `None` if one of them has no texture.
+/// Normalised cross-correlation; `None` if one of the windows has no texture.
 fn correlation(one: &[f32], other: &[f32]) -> Option<f64> {
-    /// Standard deviation below which a window has no texture, in grey levels: half a level is rounding.
+    /// Standard deviation, in grey levels, below which a window has no texture: half a level is rounding.
     const MIN_CONTRAST: f64 = 0.5;
     let count = one.len() as f64;
     let mean = |values: &[f32]| values.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
@@ -257,7 +261,7 @@ mod tests {
     use sdg_geometry::PinholeCamera;
     use std::f64::consts::PI;
 
-    /// Grain of about 2 mm that depends only on the position.
+    /// A grain of about 2 mm that depends only on the position.
     fn grain(x_m: f64, y_m: f64) -> f64 {
         let noise = |x: i64, y: i64| {
             let mixed = (x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0x27d4_eb2f);
@@ -270,7 +274,7 @@ mod tests {
         row(low) * (1.0 - up) + row(low + 1) * up
     }
 
-    /// A surface whose height depends on the position, seen straight down from 0.3 m and from `x_m`.
+    /// A picture of a surface whose height depends on the position, seen vertically from 0.3 m above `x_m`.
     fn view(x_m: f64, surface_m: fn(&Point2<f64>) -> f64, brightness: fn(f64, f64) -> f64) -> PosedPicture {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
         let world_from_camera = Isometry3::from_parts(Vector3::new(x_m, 0.0, 0.3).into(), down);
@@ -328,8 +332,8 @@ mod tests {
             let ahead = all.filter(|p| p.coords.dot(&direction) > 0.8 * p.coords.norm());
             ahead.map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min)
         };
-        // Along the normal of the baseline, a window of 5 mm begins 2 mm from the outline; along the baseline the top
-        // hides 30 mm · 0.085 / 0.3 more.
+        // Across the baseline, a window of 5 mm begins 2 mm from the outline. Along the baseline, the top hides 30 mm ·
+        // 0.085 / 0.3 more.
         let (along, beside) = (nearest(Vector2::x()), nearest(Vector2::y()));
         assert!((0.0265..0.033).contains(&beside) && along > beside + 0.004, "{along} {beside}");
     }

@@ -1,4 +1,4 @@
-//! The map of a workcell: the base's x points right, its y up.
+//! The map of a workcell. The base's x points right, its y points up.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Point3};
@@ -10,15 +10,16 @@ use sdg_robot::{LookOut, Place};
 
 use crate::hand_reach::Reach;
 
-/// Pixels per metre, and margin around the map.
+/// Pixels per metre of the map.
 const PX_PER_M: f64 = 720.0;
+/// Margin around the map, in pixels.
 const FRAME_PX: f64 = 46.0;
-/// Height of the legend below the map.
+/// Height of the legend below the map, in pixels.
 const KEY_PX: f64 = 74.0;
 const TEXT_PX: f64 = 9.0;
-/// The footprint of the arm's base, m.
+/// The footprint of the arm's base (x, y), in metres.
 const FOOT_M: [[f64; 2]; 2] = [[-0.17, 0.09], [-0.11, 0.11]];
-/// Spacing of the grid lines, m.
+/// Spacing of the grid lines, in metres.
 const LINES_M: f64 = 0.1;
 
 const GROUND: Rgb<u8> = Rgb([250, 249, 246]);
@@ -31,14 +32,14 @@ const OBSTACLE: Color = Color([122, 92, 150]);
 const LOOK: Color = Color([20, 120, 150]);
 const PAPER: Color = Color([250, 249, 246]);
 
-/// The drawn area, x and y in the base frame, m.
+/// The drawn area: x and y in the base frame, in metres.
 pub struct WorkcellMap {
     x_m: [f64; 2],
     y_m: [f64; 2],
 }
 
 impl WorkcellMap {
-    /// Covers the workspace, the table and the arm's base.
+    /// Chooses an area that contains the workspace, the table and the arm's base.
     pub fn around(workcell: &Workcell) -> Self {
         let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
         let mut map = Self { x_m: [min.x.min(FOOT_M[0][0]), max.x], y_m: [min.y.min(-0.2), max.y.max(0.2)] };
@@ -54,7 +55,7 @@ impl WorkcellMap {
         Self { x_m: round(map.x_m), y_m: round(map.y_m) }
     }
 
-    /// The drawn area, x and y in the base frame, m.
+    /// The drawn area: x and y in the base frame, in metres.
     pub fn area_m(&self) -> [[f64; 2]; 2] {
         [self.x_m, self.y_m]
     }
@@ -115,7 +116,7 @@ impl WorkcellMap {
         image
     }
 
-    /// A grid, with lengths in mm at its edges.
+    /// Draws a grid, with lengths in mm at the edges.
     fn draw_lines(&self, image: &mut RgbImage) {
         let thin = pen(LINE, 1.0);
         let steps = |[low, high]: [f64; 2]| {
@@ -140,13 +141,13 @@ impl WorkcellMap {
 
     fn draw_obstacle(&self, image: &mut RgbImage, obstacle: &Obstacle, labels: &mut Labels) {
         let Some(outline) = seen_from_above(obstacle) else {
-            // An unbounded wall is not drawn as an area.
+            // An unbounded wall has no outline.
             return;
         };
         let polygon = self.polygon(&outline);
         shade_polygon(image, &polygon, OBSTACLE, 0.45);
         draw_polygon(image, &polygon, &pen(OBSTACLE, 2.0));
-        // Above its upper edge.
+        // Above the upper edge of the outline.
         let top = outline.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
         let at = self.px(Point2::new(obstacle.base_from_obstacle.translation.x, top));
         labels.add(Point2::new(at.x - 12.0, at.y - 4.0), &obstacle.name, OBSTACLE);
@@ -174,7 +175,7 @@ impl WorkcellMap {
             1 => place.name.clone(),
             num => format!("{}:1 to {num}", place.name),
         };
-        // Above the mark of a pose.
+        // The label must be above the mark of a single pose.
         let above_px = if corners.len() > 1 { 4.0 } else { 0.03 * PX_PER_M };
         labels.add(Point2::new(at.x, at.y - above_px), &text, PLACE);
     }
@@ -183,7 +184,7 @@ impl WorkcellMap {
         let mut x = FRAME_PX;
         let y = FRAME_PX + (self.y_m[1] - self.y_m[0]) * PX_PER_M + 52.0;
         let mut entries = vec![
-            ("reached (paler: in fewer turns of the hand)", REACHED),
+            ("reached (paler: at fewer angles of the hand)", REACHED),
             ("workspace", WORKSPACE),
             ("place", PLACE),
             ("obstacle", OBSTACLE),
@@ -210,7 +211,7 @@ impl WorkcellMap {
     }
 }
 
-/// Labels that do not overlap.
+/// Places labels so that they do not overlap.
 #[derive(Default)]
 struct Labels(Vec<(Point2<f64>, String, Color)>);
 
@@ -227,7 +228,7 @@ impl Labels {
                     bounds.x1 < other.x2 && other.x1 < bounds.x2 && bounds.y1 < other.y2 && other.y1 < bounds.y2
                 })
             };
-            // Moved down step by step until nothing is in its way.
+            // Moved down step by step until it is clear of other labels.
             let mut place = at;
             let mut bounds = label_bounds(image, place, &text, TEXT_PX);
             while overlaps(&bounds) && bounds.y2 < f64::from(image.height()) - 1.0 {
@@ -244,7 +245,7 @@ fn pen(color: Color, width: f64) -> Pen {
     Pen::new(color).width(width).without_halo()
 }
 
-/// An obstacle's outline from above; `None` for a plane.
+/// The outline of an obstacle from above; `None` for a plane.
 fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
     let Obstacle { shape, base_from_obstacle, .. } = obstacle;
     let ring = |radius_m: f64, z: f64| {
@@ -263,7 +264,7 @@ fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
             [-half_length_m, half_length_m].into_iter().flat_map(|z| ring(radius_m, z)).collect()
         }
         Shape::Capsule { radius_m, half_length_m } => {
-            // Balls at both ends: a circle around each, in any orientation.
+            // Spheres at both ends: a circle around each, in any orientation.
             let ends = [-half_length_m, half_length_m].map(|z| base_from_obstacle * Point3::new(0.0, 0.0, z));
             let circles =
                 ends.iter().flat_map(|end| ring(radius_m, 0.0).map(move |p| Point2::new(end.x + p.x, end.y + p.y)));

@@ -1,5 +1,5 @@
-//! Grasps without a given height, of parts on tables that are higher than configured and on blocks of unknown height:
-//! accuracy of the measured heights, and number of grasps that hold. Model S, taught from the shipped photos.
+//! Grasps without a given height, on tables that are higher than configured and on blocks of unknown height. Prints the
+//! accuracy of the measured heights and the number of grasps that hold. Model S, taught from the shipped photos.
 //!
 //! ```text
 //! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; with odd seeds the table is 0 to 40 mm too high,
@@ -73,10 +73,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.extend(cases);
     }
     println!("all: {}", summary(&all, how));
-    if is_as_asked(&all, how) { Ok(()) } else { Err("not as asked for".into()) }
+    if is_as_asked(&all, how) { Ok(()) } else { Err("the criteria are not met".into()) }
 }
 
-/// The task for each case.
+/// The task in each case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum How {
     Grasp,
@@ -91,7 +91,7 @@ impl How {
     }
 }
 
-/// Model S from the shipped photo, taught with the camera that took it.
+/// Teaches model S from the shipped photo, with the camera that took it.
 fn taught(spec: &ObjectSpec) -> Result<GraspModel, Box<dyn Error>> {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;
@@ -105,19 +105,19 @@ fn taught(spec: &ObjectSpec) -> Result<GraspModel, Box<dyn Error>> {
     Ok(taught.model.with_lengths(lengths, f64::INFINITY)?)
 }
 
-/// A part that lies higher than the configuration says.
+/// A part that lies higher than configured.
 struct Case {
     spec: ObjectSpec,
     seed: u64,
     scene: SceneVariation,
     block: Option<Obstacle>,
-    /// Height of the table over the configured one, and of the part over the table, m.
+    /// Height of the table above the configured one, and height of the part above the table, m.
     higher_m: [f64; 2],
 }
 
 impl Case {
     fn draw(spec: &ObjectSpec, seed: u64) -> Self {
-        // The parts' heights differ too.
+        // The parts have different heights as well.
         let name = spec.name.bytes().fold(seed, |mixed, byte| mixed.wrapping_mul(31).wrapping_add(u64::from(byte)));
         let seed_of_part = name.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let rng = &mut Pcg64Mcg::seed_from_u64(seed_of_part);
@@ -147,7 +147,7 @@ impl Case {
         Self { spec: spec.clone(), seed, scene, block, higher_m: [0.0, block_m] }
     }
 
-    /// z of the marks in the base, m.
+    /// z of the marks in the base frame, m.
     fn marks_m(&self) -> f64 {
         self.higher_m[1] + self.spec.mark_height_m
     }
@@ -184,7 +184,7 @@ impl Case {
     }
 }
 
-/// Pictures of the simulated wrist camera.
+/// The pictures of the simulated wrist camera.
 struct WristPictures;
 
 impl Pictures<Workcell> for WristPictures {
@@ -211,7 +211,7 @@ struct Found {
 }
 
 impl Found {
-    /// Error and its standard deviation, m.
+    /// The error and its standard deviation, m.
     fn error_m(&self) -> Option<[f64; 2]> {
         let measured = self.report.height.as_ref()?.measured?;
         Some([measured.height_m - self.marks_m, measured.sigma_m])
@@ -220,7 +220,7 @@ impl Found {
     fn why(&self) -> String {
         match &self.report.outcome {
             GraspOutcome::Held if self.is_held => "held".to_owned(),
-            GraspOutcome::Held => "held by the hand's word only".to_owned(),
+            GraspOutcome::Held => "held according to the hand alone".to_owned(),
             GraspOutcome::Failed { step, why } => format!("{step}: {why}"),
         }
     }
@@ -239,7 +239,7 @@ impl Found {
         )
     }
 
-    /// The measurements in the pictures.
+    /// Prints the measurements in the pictures.
     fn raw(&self, case: &Case) -> String {
         let HeightReport { sightings, why_not, .. } = self.report.height.clone().unwrap_or_default();
         let sightings = sightings.iter().map(|sighting| {
@@ -277,7 +277,7 @@ fn summary(cases: &[Found], how: How) -> String {
         false => String::new(),
     };
     format!(
-        "{} of {} measured, error {median_mm:.2} mm in the median, {bias_mm:+.2} mm in the mean, {num_within} within 2 mm, errors over their sigma \
+        "{} of {} measured, median error {median_mm:.2} mm, mean error {bias_mm:+.2} mm, {num_within} within 2 mm, errors over their sigma \
          {spread:.2}{held}",
         errors.len(),
         cases.len()

@@ -1,11 +1,11 @@
-//! A cell in MuJoCo with the interface of a real ROS cell: the wrist camera is published, arm and hand are action
+//! A cell in MuJoCo with the interface of a real ROS cell: the wrist camera is published, and arm and hand are action
 //! servers.
 //!
 //! ```text
 //! ros2_cell PART [SEED [DOMAIN [RMW]]]
 //! image, camera_info, /tf: 5 a second │ /joint_states: 50 │ FollowJointTrajectory, GripperCommand
 //! ```
-//! examples/ros2/README.md drives it with `sdg ros2`. Simulated time follows the clock.
+//! examples/ros2/README.md uses it with `sdg ros2`. Simulated time follows the clock.
 
 use std::time::{Duration, Instant, SystemTime};
 
@@ -28,17 +28,17 @@ const CAMERA_FRAME: &str = "camera_optical_frame";
 const BASE_FRAME: &str = "panda_link0";
 const PICTURE_EVERY: Duration = Duration::from_millis(200);
 const STATES_EVERY: Duration = Duration::from_millis(20);
-/// Maximum lag of the simulation behind the clock, s. It is longer than rendering a picture; otherwise every picture
-/// would delay the arm.
+/// Maximum lag of the simulation behind the clock, s. It is longer than the rendering of a picture; otherwise every
+/// picture would delay the arm.
 const MAX_BEHIND_SECS: f64 = 0.5;
-/// Fingers that move less than this within a tenth of a second are at rest, m.
+/// Fingers that move by less than this within a tenth of a second are at rest, m.
 const STILL_M: f64 = 2e-4;
-/// A hand within this distance of its target opening has reached it, m.
+/// A hand whose opening is within this distance of its target has reached it, m.
 const THERE_M: f64 = 1e-3;
-/// Minimum duration of a hand command, so that the force builds up.
+/// Minimum duration of a hand command, so that the force can build up.
 const MIN_HAND: Duration = Duration::from_millis(400);
 const MAX_HAND: Duration = Duration::from_secs(3);
-/// A part is lifted if it has risen by this much, m.
+/// A part is lifted if it has risen by at least this, m.
 const LIFTED_M: f64 = 0.05;
 
 type Trajectories = ActionServer<FollowJointTrajectoryGoal, FollowJointTrajectoryResult, FollowJointTrajectoryFeedback>;
@@ -54,7 +54,7 @@ struct Cell {
     states: Publisher<JointState>,
     /// The current motion, its start time, and its start position.
     motion: Option<(JointTrajectory, f64, JointVector)>,
-    /// Position that the arm holds.
+    /// Joint positions that the arm holds.
     held: JointVector,
     hand: Option<(HandCommand, Instant, f64)>,
     secs: f64,
@@ -99,7 +99,7 @@ impl Cell {
         let lay_m = self.workcell.base_from_object().context("a part")?.translation.z;
         let mut is_lifted = false;
         loop {
-            // On a slow computer, simulation time is dropped: otherwise requests would wait for ever and the arm would
+            // On a slow computer, simulated time is dropped: otherwise requests would wait for ever, and the arm would
             // move too fast to catch up.
             let behind_secs = begun.elapsed().as_secs_f64() - self.secs - MAX_BEHIND_SECS;
             begun += Duration::from_secs_f64(behind_secs.max(0.0));
@@ -188,7 +188,7 @@ impl Cell {
         let is_still = (opening_m - before_m).abs() < STILL_M;
         let is_over = is_there || is_still || since.elapsed() > MAX_HAND;
         if !is_over {
-            // Checked again after the time in which moving fingers exceed `STILL_M`.
+            // Checked again after a time in which moving fingers exceed `STILL_M`.
             self.hand = Some((command, Instant::now() - MIN_HAND + Duration::from_millis(100), opening_m));
             return Ok(());
         }
@@ -235,8 +235,8 @@ fn joints(values: &[f64]) -> JointVector {
     JointVector::from_iterator(values.iter().copied())
 }
 
-/// Positions, velocities and accelerations at a time; `None` after the end. Cubic interpolation, as in ros2_control for
-/// points with positions and velocities.
+/// Positions, velocities and accelerations at a time; `None` after the end. Cubic interpolation, as ros2_control does
+/// for points with positions and velocities.
 fn at(trajectory: &JointTrajectory, from: &JointVector, secs: f64) -> Option<(JointVector, JointVector, JointVector)> {
     let next = trajectory.points.iter().position(|point| point.time_from_start.secs() >= secs)?;
     let to = &trajectory.points[next];

@@ -1,10 +1,10 @@
-//! Tracking on rendered frames with the real threads: `tracking ADDRESS FRAMES [MODEL_FILE]`, as
-//! `tracking 'pendulum?speed=50&noise=2&beside=mirrored' 500`.
+//! Tracks parts in rendered frames with the real threads: `tracking ADDRESS FRAMES [MODEL_FILE]`, such as `tracking
+//! 'pendulum?speed=50&noise=2&beside=mirrored' 500`.
 //!
-//! Frames are rendered first, then tracked twice: as fast as possible, and at the camera's frame rate. Prints frames
-//! per second, the time to track a frame, the processor time of all threads, and the errors against the ground truth,
-//! with those of detections in single frames for comparison. Without a model file, model S is taught from the shipped
-//! photo.
+//! Frames are rendered first, then tracked twice: as fast as possible, and at the camera's frame rate. Prints the
+//! frames per second, the time to track a frame, the processor time of all threads, and the errors relative to the
+//! ground truth; for comparison also those of detections in single frames. Without a model file, model S is taught from
+//! the shipped photo.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -69,7 +69,7 @@ fn main() -> Result<()> {
     detect(&model, &shown, part.symmetry)
 }
 
-/// The same errors for detections in single frames.
+/// The errors of detections in single frames.
 fn detect(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry) -> Result<()> {
     let (mut pixels, mut degrees, mut walls, mut missed) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for frame in shown.iter().step_by(DETECT_EVERY) {
@@ -139,7 +139,7 @@ fn spread(values: &mut [f64]) -> String {
     format!("mean {mean:.2}, median {:.2}, 95 % {:.2}, most {:.2}", at(0.5), at(0.95), at(1.0))
 }
 
-/// Errors of tracked parts, and the number of frames with a visible part that is not tracked.
+/// Errors of tracked parts, and the number of frames in which a visible part is not tracked.
 fn report_errors(shown: &[Shown], all: &[Vec<TrackedPart>], symmetry: RotationalSymmetry) {
     let (mut pixels, mut degrees, mut scores) = (Vec::new(), Vec::new(), Vec::new());
     let (mut num_shown, mut within, mut wrong, mut first) = (0, 0, 0, None);

@@ -62,7 +62,7 @@ pub enum Command {
     Ros2(WithoutRos2Args),
     /// Plan a motion around the obstacles of a workcell and draw it; nothing moves
     Plan(PlanArgs),
-    /// Draw a workcell's file from above, with the part of the table that the arm reaches
+    /// Draw a workcell from above, with the area of the table that the arm reaches
     #[command(subcommand)]
     Workcell(WorkcellCommand),
     /// Show the state of a real arm, move it home, recover it after an error, open and close its hand

@@ -1,11 +1,11 @@
-//! Time since the program's start, so that reported durations include everything that a person waited for.
+//! The time since the program's start, so that reported durations include all waiting.
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
 static STARTED: OnceLock<Instant> = OnceLock::new();
 
-/// Records the program's start. Call it once, before anything else.
+/// Records the program's start. Must be called once, before anything else.
 pub fn start() {
     STARTED.get_or_init(Instant::now);
 }

@@ -36,7 +36,7 @@ pub fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     Ok((photo.to_owned(), beside_photo(photo)?))
 }
 
-/// Splits at a colon. Paths may contain colons themselves: of several, the one between two existing files is chosen.
+/// Splits at a colon. Paths may contain colons as well: of several colons, the one between two existing files is used.
 pub fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let splits: Vec<(PathBuf, PathBuf)> = argument
         .match_indices(':')

@@ -83,7 +83,7 @@ const EXAMPLES: &[[&str; 2]] = &[
     ["sdg devices", "sdg devices --json"],
 ];
 
-/// The command and all its subcommands, with examples and exit codes at the end of their help.
+/// Adds examples and exit codes to the end of the help of the command and of all its subcommands.
 pub fn with_examples(command: Command) -> Command {
     with_ending(command, "")
 }
@@ -117,7 +117,7 @@ mod tests {
     use crate::args::Args;
     use clap::{CommandFactory, Parser};
 
-    /// Longer lines are wrapped in the help and cannot be copied.
+    /// Longer lines are wrapped in the help and can then not be copied.
     const MAX_CHARS: usize = 98;
 
     fn verbs(command: &Command, parents: &str) -> Vec<String> {

@@ -13,11 +13,11 @@ use sdg_robot::RobotError;
 /// The result of a command that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// 0.
+    /// Exit code 0.
     Done,
-    /// 3: no grasp was found.
+    /// Exit code 3: no grasp was found.
     NothingToGrasp,
-    /// 4: the model was written, but fails on its held-back samples.
+    /// Exit code 4: the model was written, but fails on its held-out samples.
     ModelFails,
 }
 
@@ -32,7 +32,7 @@ impl Outcome {
     }
 }
 
-/// Arguments that clap accepts but that are invalid: exit code 2, as for any wrong usage.
+/// Arguments that clap accepts but that are invalid: exit code 2, as for other wrong usage.
 #[derive(Debug)]
 pub struct Usage(pub String);
 
@@ -67,14 +67,14 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
     if error.is::<Usage>() { 2 } else { 1 }
 }
 
-/// Whether the reader of our output closed the pipe, as `head` does; this is not a failure.
+/// Whether the reader of the output closed the pipe, as `head` does. This is not a failure.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<io::Error>().is_some_and(|io_error| io_error.kind() == io::ErrorKind::BrokenPipe)
     })
 }
 
-/// The error and its causes on one line, followed by the option that helps.
+/// The error and its causes on one line, followed by the option that corrects it.
 pub fn one_line(error: &anyhow::Error) -> String {
     let line = sdg_inputs::one_line(error);
     match error.chain().find_map(remedy) {
@@ -83,11 +83,11 @@ pub fn one_line(error: &anyhow::Error) -> String {
     }
 }
 
-/// The option that helps with a library's error; libraries do not know options.
+/// The option that corrects a library's error, since libraries do not know options.
 fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     let of_model = |error: &GraspError| match error {
         GraspError::Region(RegionError::OtherPicture { .. }) => Some(
-            "sdg detect --region X,Y,W,H searches another one, and --region all searches all of the picture".to_owned(),
+            "sdg detect --region X,Y,W,H searches another one, and --region all searches the whole picture".to_owned(),
         ),
         GraspError::NoLengths => Some("teach it again with --camera and --mark-height-mm".to_owned()),
         GraspError::BackendNotBuilt { asked, .. } => Some(format!("build sdg-cli with --features {asked}")),

@@ -1,4 +1,4 @@
-//! A detection as a line of text, and the reasons for its refusal.
+//! The text line of a detection, and the reasons for refusing it.
 
 use sdg_calibration::Frame;
 use sdg_cell::{DEFAULT_MIN_SCORE, Found, Perception};
@@ -6,12 +6,13 @@ use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 
 use crate::paint::{Paint, Tone};
 
-/// Minimum score for advice: below it nothing resembles the part, and advice would mislead. Chosen by hand.
+/// Minimum score for advice. Below it, the detection does not resemble the part, and advice would mislead. Chosen by
+/// hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
-/// Deviations from the photo's size below this are not given as a reason. Chosen by hand.
+/// Minimum relative difference from the photo's size that is given as a reason. Chosen by hand.
 const SIZE_TOLERANCE: f64 = 0.03;
 
-/// The advice, in words, for a refused detection that is the part after all.
+/// The advice, in words, for a refused detection that may be the part.
 pub fn advice_in_words(advice: Advice) -> &'static str {
     match advice {
         Advice::CheckSize => {
@@ -38,8 +39,8 @@ pub struct Wording<'a> {
 }
 
 impl Wording<'_> {
-    /// A detection in words, also in metres if the camera is known. For a refused one the reasons follow, for an
-    /// accepted one the parts that its jaws would touch.
+    /// A detection in words, also in metres if the camera is known. For a refused one, the reasons follow; for an
+    /// accepted one, the parts that its jaws would touch.
     pub fn line(&self, found: &Found, touched: &[&GraspDetection]) -> String {
         let Found { detection, pose } = found;
         let grasp = detection.grasp;
@@ -78,7 +79,7 @@ impl Wording<'_> {
         )
     }
 
-    /// For each detection, the indices in the list of the parts that its jaws would touch; only accepted detections are
+    /// For each detection, the indices of the detections whose parts its jaws would touch. Only accepted detections are
     /// compared.
     pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| self.is_accepted(detections[idx])).collect();
@@ -99,7 +100,7 @@ impl Wording<'_> {
         detection.score >= self.min_score
     }
 
-    /// The components of the score; the network's share only if there is a network.
+    /// The components of the score; the network's component only if there is a network.
     fn measured(&self, detection: &GraspDetection) -> String {
         let network =
             self.detector.model().kind().has_network().then(|| format!("network {:.2}", detection.network_score));
@@ -133,7 +134,7 @@ impl Wording<'_> {
         ))
     }
 
-    /// The strongest reasons in words, `most` at most.
+    /// The strongest reasons in words, at most `most` of them.
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
         let size =
@@ -151,8 +152,8 @@ impl Wording<'_> {
         if reasons.is_empty() { "all evidence together is too weak".to_owned() } else { reasons.join("; also ") }
     }
 
-    /// The line of a picture without accepted detections: the number of refused ones, and the best of them.
-    /// `are_listed` says whether a line for each of them follows.
+    /// The line for a picture without accepted detections: the number of refused ones, and the best of them.
+    /// `are_listed` states whether a line for each of them follows.
     pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
             let nothing = self.doubtful("nothing to grasp");
@@ -162,7 +163,7 @@ impl Wording<'_> {
         let see_all = if are_listed { "" } else { " (see --all)" };
         let (x, y) = (best.grasp.x, best.grasp.y);
         let why = self.refusal(best).unwrap_or_default();
-        // A second advice would only compete with the first.
+        // A second advice would contradict the first.
         let other_size =
             best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
         format!(
@@ -181,7 +182,7 @@ impl Wording<'_> {
         self.detector.region().map(|region| format!(" in {region}")).unwrap_or_default()
     }
 
-    /// If the picture's size differs from the photo's: a hint that the part may have a size outside the searched range.
+    /// A hint for a picture whose size differs from the photo's: the part's size may be outside the searched range.
     fn of_other_size(&self) -> Option<String> {
         if self.detector.camera_over_table().is_some() {
             return None;

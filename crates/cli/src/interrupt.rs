@@ -1,10 +1,10 @@
-//! Ctrl-C: the first ends the run with the results so far, the second ends it at once.
+//! Ctrl-C: the first one ends the run and keeps the results so far; the second one ends the program immediately.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Signals closer together than this count as one: `timeout -s INT` sends the signal to the process and to its group.
+/// Minimum time between two separate signals: `timeout -s INT` sends the signal to the process and to its group.
 const DEBOUNCE: Duration = Duration::from_millis(500);
 
 /// Whether Ctrl-C was pressed.
@@ -17,7 +17,7 @@ impl Interrupt {
         let interrupt = Self::default();
         let flag = Arc::clone(&interrupt.0);
         let mut first: Option<Instant> = None;
-        // Without a handler Ctrl-C ends the process; this too leaves no half-written file.
+        // Without a handler, Ctrl-C ends the process; no half-written file is left then either.
         let _ = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
             if first.get_or_insert_with(Instant::now).elapsed() > DEBOUNCE {

@@ -1,17 +1,16 @@
-//! Results in JSON on standard output.
+//! Results as JSON on standard output.
 
 use std::io;
 
 use serde::Serialize;
 use serde_json::ser::{CompactFormatter, Formatter};
 
-/// Six digits after the point: a millionth of a metre, pixel, degree or second is below the accuracy of every value
-/// here.
+/// Six decimals: a millionth of a metre, pixel, degree or second is below the accuracy of every printed value.
 const ROUND_TO: f64 = 1e6;
-/// Larger numbers have at most six digits after the point anyway, and rounding would lose digits before it.
+/// Larger numbers have at most six decimals anyway, and rounding would change the digits before the point.
 const MAX_ROUNDED: f64 = 4e9;
 
-/// A line of compact JSON without a line end, with at most six digits after each point.
+/// A line of compact JSON without a line end; numbers have at most six decimals.
 ///
 /// # Errors
 /// The value cannot be serialised.
@@ -30,7 +29,7 @@ impl Formatter for Rounded {
 
     fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
         let rounded = if value.abs() < MAX_ROUNDED { (value * ROUND_TO).round() / ROUND_TO } else { value };
-        // A small negative number must not be rounded to negative zero.
+        // Adding zero keeps a small negative number from being rounded to negative zero.
         CompactFormatter.write_f64(writer, rounded + 0.0)
     }
 }

@@ -5,16 +5,16 @@
 //! ```
 //!
 //! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) the program is
-//! small, for small machines: it teaches and detects, without MuJoCo, EGL and the annotation page.
+//! suited to small machines: it teaches and detects, without MuJoCo, EGL and the annotation page.
 //!
-//! The binary only calls [`run`]. The work is done in other crates; this crate has the arguments, texts, progress and
-//! exit codes. It is not an interface for other programs.
+//! The binary only calls [`run`]. Other crates do the work; this crate has the arguments, texts, progress and exit
+//! codes. It is not an interface for other programs.
 //!
 //! ```
 //! use clap::Parser;
 //! use sdg_cli::args::{Args, Command};
 //!
-//! let args = Args::try_parse_from(["sdg", "demo", "--attempts", "3"]).expect("a call that docs/command-line.md describes");
+//! let args = Args::try_parse_from(["sdg", "demo", "--attempts", "3"]).expect("a call as in docs/command-line.md");
 //! assert!(matches!(args.command, Command::Demo(demo) if demo.object == "pendulum" && demo.attempts == 3));
 //! ```
 #![forbid(unsafe_code)]
@@ -58,7 +58,8 @@ pub fn command() -> ClapCommand {
 }
 
 #[doc(hidden)]
-/// Parses arguments, the program's name first. Wrong arguments and `--help` end the process with their text.
+/// Parses arguments, the first of which is the program's name. For wrong arguments and `--help`, it prints the text and
+/// ends the process.
 pub fn parse_args(arguments: impl IntoIterator<Item = OsString>) -> Args {
     clock::start();
     Args::from_arg_matches(&command().get_matches_from(arguments)).unwrap_or_else(|error| error.exit())
@@ -121,7 +122,7 @@ pub fn run(args: &Args) -> u8 {
     }
 }
 
-/// Verbs whose total time is printed at the end: those that take long and do not report it in their own lines.
+/// Whether the total time is printed at the end: for verbs that take long and do not report it themselves.
 fn prints_total_time(command: &Command) -> bool {
     match command {
         Command::Demo(_) | Command::Rehearse(_) | Command::Augment(_) => true,

@@ -1,4 +1,4 @@
-//! Teaching and detection for the annotation page; its crate does not depend on grasp models.
+//! Teaching and detection for the annotation page, whose crate does not depend on grasp models.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -27,12 +27,12 @@ use sdg_inputs::camera_files::CameraFile;
 use crate::found_text::{MIN_ADVISED_SCORE, Wording};
 use crate::paint::Paint;
 
-/// Teaches with one preset.
+/// Teaches models with one preset.
 pub struct PageTeacher {
     /// Network, training and augmentation.
     pub preset: Preset,
-    /// The camera of the photos and of the pictures to try, and the heights of marks and grasp over the table in
-    /// metres.
+    /// The camera of the photos and of the pictures to try, and the heights of the marks and of the grasp above the
+    /// table, in metres.
     pub camera: Option<(CameraFile, [f64; 2])>,
 }
 
@@ -82,7 +82,7 @@ impl GraspTeacher for PageTeacher {
 }
 
 impl PageTeacher {
-    /// A model, and its demonstrations as taught: in the plan view if a camera is known.
+    /// A model and its demonstrations as taught: in the plan view if a camera is known.
     fn taught_file<'m>(
         &self,
         material: &'m TeachingMaterial,
@@ -136,7 +136,7 @@ fn page_region(region: &SearchRegion) -> Region {
     Region { x, y, width, height, picture }
 }
 
-/// `seconds` is the time that the person waited: teaching, and testing the model on held-back samples.
+/// `seconds` includes all waiting: for the teaching and for the test of the model on held-out samples.
 fn summary(model: &GraspModel, figures: Option<Figures>, seconds: f64) -> TaughtSummary {
     let negatives =
         model.facts().negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
@@ -161,9 +161,13 @@ fn page_figures(figures: &HeldBackFigures) -> Figures {
 
 fn step(event: &TeachingEvent) -> TeachingStep {
     match event {
-        TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => {
-            TeachingStep::Step { of: "its turns", is_last: false, done: step + 1, planned: *planned_steps, loss: *loss }
-        }
+        TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => TeachingStep::Step {
+            of: "the angles",
+            is_last: false,
+            done: step + 1,
+            planned: *planned_steps,
+            loss: *loss,
+        },
         TeachingEvent::Step { record, planned_steps, .. } => TeachingStep::Step {
             of: "the network",
             is_last: true,
@@ -177,11 +181,11 @@ fn step(event: &TeachingEvent) -> TeachingStep {
     }
 }
 
-/// One search at a time: each uses all cores.
+/// Only one search runs at a time, because each uses all cores.
 struct PageModel {
     detector: Mutex<Perception>,
     summary: TaughtSummary,
-    /// Contents of its file.
+    /// Contents of the model file.
     bytes: Vec<u8>,
 }
 
@@ -244,10 +248,10 @@ impl TaughtModel for PageModel {
     }
 }
 
-/// Advice in words for the page, which has buttons instead of options.
+/// The advice as text for the page, which has buttons instead of options.
 fn remedy(advice: Advice) -> String {
     let words = match advice {
-        Advice::CheckSize => "if it is the part, learn from it: it is taught at this size, too",
+        Advice::CheckSize => "if it is the part, learn from it: this size is then taught as well",
         Advice::DarkerPhoto => "if it is the part, a second demonstration in darker light would help",
         Advice::BrighterPhoto => "if it is the part, a second demonstration in brighter light would help",
         Advice::Uncover => "if it is the part, uncover it, or add a demonstration taken from this side",
@@ -256,7 +260,7 @@ fn remedy(advice: Advice) -> String {
     words.to_owned()
 }
 
-/// `jaws_touch` stays empty: it depends on the other detections.
+/// `jaws_touch` stays empty, because it depends on the other detections.
 fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
     let detection = &found.detection;
     FoundGrasp {
@@ -300,7 +304,7 @@ mod tests {
         RgbImage::from_fn(200, 120, |x, y| image::Rgb([(x * 5 % 251) as u8, (y * 7 % 241) as u8, 90]))
             .save(&photo)
             .unwrap();
-        // Beside the middle of the line the outline is twice as wide as at its ends.
+        // At the middle of the line, the outline is twice as wide as elsewhere.
         let labelme = r#"{"imageWidth": 200, "imageHeight": 120, "shapes": [
             {"label": "bar", "shape_type": "polygon", "group_id": 1, "points": [[20, 40], [60, 40], [60, 20], [80, 20], [80, 40],
                 [180, 40], [180, 80], [80, 80], [80, 100], [60, 100], [60, 80], [20, 80]]},

@@ -1,8 +1,8 @@
-//! Terminal colours: none in files and pipes, with `NO_COLOR` (https://no-color.org) or on a dumb terminal.
+//! Terminal colours: none for files, pipes and dumb terminals, nor with `NO_COLOR` (https://no-color.org).
 
 use std::io::IsTerminal;
 
-/// The meaning of a colour; the text states it too.
+/// The meaning of a colour, which the text also states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
     /// Found.
@@ -13,7 +13,7 @@ pub enum Tone {
     Bad,
 }
 
-/// Whether a stream is coloured.
+/// Whether the output to a stream is coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Paint(bool);
 

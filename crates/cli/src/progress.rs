@@ -8,7 +8,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use sdg_evaluation::Progress;
 
-/// Shows progress; shared by all workers.
+/// Shows progress. All workers use the same instance.
 pub struct EvaluationProgress {
     bar: Option<ProgressBar>,
     started: Instant,

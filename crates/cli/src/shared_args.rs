@@ -17,20 +17,20 @@ pub struct ComputeArgs {
 /// The camera that took the photos to teach from.
 #[derive(Debug, ClapArgs)]
 pub struct TaughtCameraArgs {
-    /// The calibrated camera that took the photos, as ROS camera_info YAML with the camera's pose over the table. The
+    /// The calibrated camera that took the photos, as ROS camera_info YAML with the camera's pose above the table. The
     /// model then knows the part's size and works with every calibrated camera
     #[arg(id = "camera", long = "camera", value_name = "FILE", requires = "mark_height_mm")]
     pub file: Option<PathBuf>,
-    /// Height over the table of the surface with the marks
+    /// Height of the surface with the marks above the table
     #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
     pub mark_height_mm: Option<f64>,
-    /// Height over the table at which the gripper closes; default: half of the marks' height
+    /// Height above the table at which the gripper closes; default: half of the marks' height
     #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
     pub grasp_height_mm: Option<f64>,
 }
 
 impl TaughtCameraArgs {
-    /// Heights over the table of the marks and of the grasp, in metres.
+    /// Heights of the marks and of the grasp above the table, in metres.
     pub fn heights_m(&self) -> [f64; 2] {
         let mark = self.mark_height_mm.unwrap_or_default();
         [mark, self.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
@@ -40,7 +40,7 @@ impl TaughtCameraArgs {
 /// The part's height, if known.
 #[derive(Debug, Clone, Copy, ClapArgs)]
 pub struct ToldHeightArgs {
-    /// Height of the marks over the workcell's table. With a camera on the hand it may be omitted: it is then measured
+    /// Height of the marks above the workcell's table. With a camera on the hand it may be omitted: it is then measured
     /// from two pictures on the way down. If both are known, the more certain one is used, and a grasp is refused if
     /// they contradict each other
     #[arg(long, value_name = "MM", value_parser = height_mm)]
@@ -51,7 +51,7 @@ pub struct ToldHeightArgs {
 }
 
 impl ToldHeightArgs {
-    /// The given height for a table at `table_height_m` in the base frame, m.
+    /// The given height of the marks; `table_height_m` is the table's z. Both are in the base frame, in metres.
     pub fn told(&self, table_height_m: f64) -> Option<GivenHeight> {
         let height_m = table_height_m + 1e-3 * self.mark_height_mm?;
         Some(GivenHeight { height_m, sigma_m: 1e-3 * self.mark_height_sigma_mm })
@@ -61,17 +61,17 @@ impl ToldHeightArgs {
 /// Properties of the user's own part that the photo does not show.
 #[derive(Debug, Clone, ClapArgs)]
 pub struct OwnPartArgs {
-    /// Rehearse the part that the model was taught from, with its outline and photo, in place of --object: its height
-    /// over the table; not needed for a model taught with --camera
+    /// Height of your own part above the table, to rehearse the part that the model was taught from, with its outline
+    /// and photo, instead of --object; not needed for a model taught with --camera
     #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub height_mm: Option<f64>,
-    /// Length of the longer side of its box; not needed for a model taught with --camera
+    /// Length of the longer side of the part's box; not needed for a model taught with --camera
     #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub length_mm: Option<f64>,
-    /// Mass; default: that of its volume at 1.5 g/cm3
+    /// Mass of the part; default: computed from its volume at 1.5 g/cm3
     #[arg(long, value_name = "G", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub mass_g: Option<f64>,
-    /// Coefficient of friction of its surface; default: 0.6
+    /// Coefficient of friction of the part's surface; default: 0.6
     #[arg(long, value_name = "MU", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub friction: Option<f64>,
 }
@@ -94,7 +94,7 @@ impl SizeTolerance {
     }
 }
 
-/// The region of pictures that is searched.
+/// The region to search in pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionArg {
     /// The whole picture.
@@ -123,10 +123,10 @@ pub fn region_or_all(text: &str) -> Result<RegionArg, String> {
     if text.eq_ignore_ascii_case("all") {
         return Ok(RegionArg::All);
     }
-    region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or all, for all of the picture"))
+    region(text).map(RegionArg::Part).map_err(|error| format!("{error}; or `all` for the whole picture"))
 }
 
-/// Parses a device's name.
+/// Parses the name of a device.
 pub fn backend(text: &str) -> Result<ComputeBackend, String> {
     text.parse().map_err(|error: sdg_grasp::GraspError| error.to_string())
 }
@@ -166,7 +166,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a height over the table. A larger number than half a metre suggests another unit.
+/// Parses a height above the table, at most half a metre: a larger number suggests another unit.
 pub fn height_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a height", [0.0, 500.0])
 }
@@ -181,8 +181,7 @@ fn size_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a size", [1.0, 5000.0])
 }
 
-/// Parses a length from `min` to `max`. A number below 0.1 mm is finer than any accuracy here: it was probably given in
-/// metres.
+/// Parses a length from `min` to `max`. A positive number below both 0.1 and `min` was probably given in metres.
 pub fn millimetres(text: &str, name: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
     const MIN_MM: f64 = 0.1;
     let number = text.parse().unwrap_or(f64::NAN);
@@ -223,7 +222,7 @@ mod tests {
             region("10,10,0,5").unwrap_err(),
             "expected a width and a height of at least 1 pixel, found 0 and 5"
         );
-        assert!(region_or_all("everything").unwrap_err().ends_with("or all, for all of the picture"));
+        assert!(region_or_all("everything").unwrap_err().ends_with("or `all` for the whole picture"));
     }
 
     #[test]

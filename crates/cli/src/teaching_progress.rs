@@ -1,4 +1,4 @@
-//! Progress of a teaching on standard error: a bar on a terminal, plain lines elsewhere.
+//! Progress of a teaching on standard error: a bar on a terminal, plain lines otherwise.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -13,10 +13,10 @@ const STEPS_PER_LINE: usize = 20;
 /// Weight of the newest loss in the displayed moving average.
 const SMOOTHING: f64 = 0.1;
 
-/// The bar; the message gets the rest of the terminal's width and is cut there.
+/// The bar. The message gets the rest of the terminal's width and is cut at its end.
 const TEMPLATE: &str = "teaching {bar:12.cyan/blue} {pos}/{len} {wide_msg}";
 /// Shown after the last step, while the model is tested.
-const AFTER_LAST_STEP: &str = "trying it on held-back samples";
+const AFTER_LAST_STEP: &str = "testing it on held-out samples";
 
 /// Shows events, and stops the teaching on Ctrl-C.
 pub struct TeachingProgress {
@@ -28,7 +28,7 @@ pub struct TeachingProgress {
 }
 
 impl TeachingProgress {
-    /// Shows a bar if standard error is a terminal, else lines.
+    /// Creates a display with a bar if standard error is a terminal, otherwise with lines.
     pub fn new(interrupt: Interrupt) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| bar_on(ProgressDrawTarget::stderr()));
         Self { bar, interrupt, told_of_interrupt: false, loss: None, last_validation: String::new() }
@@ -92,7 +92,8 @@ impl TeachingProgress {
         );
         if self.bar.is_none() {
             eprintln!(
-                "teaching: after {} steps the network alone finds {} of {} held-back, median {:.1} px and {:.1}°; false alarms in {} of {}",
+                "teaching: after {} steps the network alone finds {} of {} held-out, median {:.1} px and {:.1}°; \
+                 false alarms in {} of {}",
                 record.steps_done,
                 v.hits,
                 v.positives,
@@ -133,13 +134,13 @@ fn show_step(bar: &ProgressBar, done: usize, planned: usize, message: String) {
     bar.set_message(message);
 }
 
-/// Estimated seconds until the last step at the pace so far; `None` after it, because an unknown amount of work
-/// follows.
+/// Estimated seconds until the last step, at the average pace so far. `None` after the last step, because the remaining
+/// work is unknown.
 fn left_secs(elapsed_secs: f64, done: usize, planned: usize) -> Option<f64> {
     (done < planned).then(|| elapsed_secs / done as f64 * (planned - done) as f64)
 }
 
-/// Minutes and seconds, rounded up: a remaining time is never shown as zero.
+/// Minutes and seconds, rounded up, so that a remaining time is never shown as zero.
 fn clock(secs: f64) -> String {
     let secs = secs.ceil() as u64;
     format!("{}:{:02}", secs / 60, secs % 60)
@@ -187,7 +188,7 @@ mod tests {
         }
     }
 
-    /// Removes the colours.
+    /// Removes colour codes.
     fn plain(text: &str) -> String {
         let mut parts = text.split('\u{1b}');
         let first = parts.next().unwrap_or_default().to_owned();

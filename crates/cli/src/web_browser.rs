@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-/// Tries to open a page in the browser; its address is printed in any case.
+/// Tries to open a page in the browser. The caller prints its address in any case.
 pub fn open(url: &str) {
     let opener: &[&str] = if cfg!(windows) {
         &["rundll32", "url.dll,FileProtocolHandler"]

@@ -1,4 +1,4 @@
-//! `sdg annotation convert`, and annotations of every format used as demonstrations.
+//! `sdg annotation convert`, and annotations of every format as demonstrations.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use crate::support::{sdg, shipped};
 use serde_json::Value;
 
-/// A file that another tool wrote.
+/// A file of another tool.
 fn foreign(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../demonstration/tests/formats").join(name)
 }
@@ -62,7 +62,7 @@ fn yolo_pose_says_what_it_has_no_room_for() {
     let line = converted(&labels, &back, &["--image", image.to_str().unwrap()]);
     assert_eq!((line["in_format"].as_str(), line["objects"][0].as_str()), (Some("yolo-pose"), Some("fuel_line")));
 
-    // Labels of another dataset exist already: class 0 must not be renamed.
+    // There are already labels of another dataset: class 0 must not be renamed.
     fs::write(folder.path().join("data.yaml"), "names: [rod_end]\nkpt_shape: [2, 3]\n").unwrap();
     let other = folder.path().join("other.txt");
     assert_refused(
@@ -97,7 +97,7 @@ fn wrong_calls_are_refused_in_one_line() {
     };
     refused(&annotation, "a.xml", &[], 2, &["a.xml", ".json (COCO) or .txt (YOLO-pose)"]);
     refused(&annotation, "a.json", &["--format", "opendr"], 2, &["--format", "coco, labelme, yolo-pose", "opendr"]);
-    refused(&foreign("yolo-pose.txt"), "a.json", &[], 2, &["--image", "does not say how large its image is"]);
+    refused(&foreign("yolo-pose.txt"), "a.json", &[], 2, &["--image", "does not state the size of its image"]);
     refused(Path::new("/nowhere.json"), "a.json", &[], 1, &["/nowhere.json", "cannot read"]);
 
     fs::copy(&annotation, at("same.json")).unwrap();
@@ -116,7 +116,7 @@ fn wrong_calls_are_refused_in_one_line() {
     refused(&at("huge.npy"), "a.json", &with_image, 1, &["huge.npy", "expected 64000000000 bytes"]);
 }
 
-/// A header that announces four thousand million numbers, without any data.
+/// A header that announces four thousand million numbers, without the data.
 fn huge_header() -> Vec<u8> {
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4000000000, 4), }\n";
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -127,7 +127,7 @@ fn huge_header() -> Vec<u8> {
 
 #[test]
 fn every_format_is_a_demonstration() {
-    // Row 3 of OpenDR's file is the part rotated by half a turn; model S learns whatever the photo shows there.
+    // Row 3 of OpenDR's file is the part rotated by 180°; model S learns whatever the photo shows at the marks.
     let folder = tempfile::tempdir().unwrap();
     let numbered = folder.path().join("3.png");
     fs::copy(shipped("fuel_line", "image.png"), &numbered).unwrap();

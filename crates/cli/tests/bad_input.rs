@@ -1,4 +1,4 @@
-//! Wrong user input: one clear line, the exit code of docs/command-line.md, no half-written file.
+//! Wrong input: one clear line, the exit code of docs/command-line.md, and no half-written file.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use sdg_evaluation::{Settings, Store};
 
 use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
-/// Asserts the exit code, and one line on standard error with every part.
+/// Asserts the exit code, and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = sdg(arguments);
     let stderr = String::from_utf8(output.stderr).unwrap();
@@ -65,7 +65,7 @@ fn a_decompression_bomb_is_refused_before_memory_is_taken() {
     teach(&pair(&bomb, &shipped("pendulum", "annotation.json")), &out, 1, &["bomb.png", "60000"]);
 }
 
-/// PNG's checksum, bit by bit.
+/// The checksum of PNG, bit by bit.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 })
@@ -279,7 +279,7 @@ fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let taught = sdg(&["teach", "--model", "S", "--demo", &photo, "--out", &model, "--json"]);
     let said = String::from_utf8(taught.stderr).unwrap();
     assert_eq!(taught.status.code(), Some(4), "{said}");
-    assert!(said.contains("fails its own held-back samples"), "{said}");
+    assert!(said.contains("fails on its own held-out samples"), "{said}");
     let line: serde_json::Value = serde_json::from_slice(&taught.stdout).unwrap();
     assert!(line["failure"].is_string() && fs::metadata(&model).is_ok(), "{line}");
 }

@@ -1,4 +1,4 @@
-//! `sdg teach --base-weights` as called by a user.
+//! `sdg teach --base-weights`, called as a user would.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -39,7 +39,8 @@ fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).unwrap()
 }
 
-/// A checkpoint with names and shapes of torchvision's model and random values, small enough that features stay finite.
+/// A checkpoint with names and shapes of torchvision's model and random values, which are small enough that features
+/// stay finite.
 fn write_torchvision_model(model: &str, path: &Path) {
     let models: BTreeMap<String, BTreeMap<String, Vec<usize>>> =
         serde_json::from_slice(&fs::read(fixture("torchvision_names.json")).unwrap()).unwrap();
@@ -59,7 +60,7 @@ fn write_torchvision_model(model: &str, path: &Path) {
     for (name, shape) in names {
         let count = shape.iter().product();
         let values: Vec<f32> = match shape.len() {
-            // Scales and variances of norms are 1; their shifts and every bias 0.
+            // Scales and variances of norms are 1; shifts and biases are 0.
             0 | 1 => {
                 vec![
                     if name.ends_with("var") || name.contains("bn") && name.ends_with("weight") { 1.0 } else { 0.0 };
@@ -94,7 +95,7 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     let demonstration = demonstration();
     let teach = ["teach", "--preset", "r50-torchvision", "--demo", &demonstration, "--out", &out, "--steps", "3"];
     let teach = [&teach[..], &["--base-weights", &ours]].concat();
-    // People have 17 keypoints, a grasp line 12.
+    // A person has 17 keypoints, a grasp line has 12.
     let refused = sdg(&teach);
     let (stdout, stderr) = (text(refused.stdout), text(refused.stderr));
     assert_eq!(refused.status.code(), Some(1));
@@ -106,14 +107,14 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     let (stdout, stderr) = (text(taught.stdout), text(taught.stderr));
     assert!(stdout.contains("reinit      roi_heads.keypoint_head.score_lowres.weight"), "{stdout}");
     assert!(stdout.contains("0 missing, 0 mismatched, 0 unused, 2 re-initialised"), "{stdout}");
-    // Three steps teach a random network nothing: it fails validation and is not kept.
+    // In three steps, a random network learns too little: it fails validation and is not kept.
     assert!(stderr.contains("teaching: step 3 of 3"), "{stderr}");
     assert!(stderr.lines().last().unwrap().contains("held-back samples: too few for a usable model"), "{stderr}");
     assert_eq!(taught.status.code(), Some(1));
     assert!(!Path::new(&out).exists());
 }
 
-/// Asserts that a backbone fills all of a network's backbone and nothing else.
+/// Asserts that a backbone fills the whole backbone of a network and no other part.
 fn assert_fills_backbone(path: &Path, network: &RcnnConfig, unused: &[&str]) -> BaseWeights {
     let mut told = Vec::new();
     let base = base_weights::read(path, network, &[], &mut |report| {
@@ -131,7 +132,7 @@ fn assert_fills_backbone(path: &Path, network: &RcnnConfig, unused: &[&str]) -> 
     base
 }
 
-/// Narrow pyramid and heads; these tests do not use them.
+/// A narrow pyramid and narrow heads, which these tests do not use.
 fn with_narrow_heads(mut network: RcnnConfig) -> RcnnConfig {
     network.fpn.channels = 8;
     network.roi_heads.box_head.fc_channels = 8;
@@ -173,14 +174,14 @@ fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
         *inner_channels = 1;
     }
     let path = fixture("msra_r50.pkl");
-    // The stem's bias belongs to a norm that is already folded; Detectron2 omits it too.
+    // The bias of the stem belongs to a norm that is already folded; Detectron2 omits it as well.
     let base = assert_fills_backbone(Path::new(&path), &network, &["conv1_b"]);
     let values = |name: &str| &base.parameters[&format!("backbone.bottom_up.{name}")].values;
     assert_eq!(
         (&values("stem.conv1.norm.running_mean")[..], &values("stem.conv1.norm.running_var")[..]),
         (&[0.0; 2][..], &[1.0; 2][..])
     );
-    // The generator's values continue through the file: the first scale is a quarter.
+    // The generator's values continue through the file, so the first scale is a quarter.
     assert_eq!(values("stem.conv1.norm.weight"), &[0.25, 0.5]);
 }
 
@@ -202,7 +203,7 @@ fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
         let output = sdg(&[&["teach", "--demo", &demonstration, "--out", &out, "--steps", "2"], arguments].concat());
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
-    // Two steps teach nothing; an error in the weights would have been reported before.
+    // In two steps the network learns too little; an error in the weights would have been reported earlier.
     for model in ["A", "D"] {
         let (code, stdout, stderr) = teach(&["--model", model, "--base-weights", &own]);
         assert!(stdout.contains("own.safetensors: seed 3"), "{stdout}");

@@ -1,5 +1,5 @@
-//! Many pictures at once: folders, standard input, broken files among valid ones, other formats, marks beside their
-//! photo.
+//! Many pictures in one call: folders, standard input, broken files among valid ones, other formats, and marks beside
+//! their photo.
 
 use std::fs;
 use std::io::Write;
@@ -130,13 +130,13 @@ fn a_refusal_says_why_and_what_would_help() {
         "{text}"
     );
     assert!(!text.contains("network"), "model S has none: {text}");
-    // Red dots at the covered edges.
+    // Red dots are at the covered edges.
     let drawn = image::open(Path::new(&drawn).join("covered.png")).unwrap().to_rgb8();
     let dots = drawn.enumerate_pixels().filter(|(_, _, pixel)| pixel.0 == [255, 40, 60]);
     let on_sheet = dots.filter(|(x, y, _)| covered.get_pixel(*x, *y).0 == [128, 126, 122]).count();
     assert!(on_sheet > 50, "{on_sheet} dots on the sheet");
 
-    // A user may set another limit.
+    // A user may set another minimum score.
     let json = |min_score: &str| {
         let output = sdg(&["detect", "--grasp-model", &model, "--json", "--min-score", min_score, &picture]);
         let line = lines(&output).remove(0);
@@ -237,7 +237,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let folder = Folder::new();
     let model = taught(&folder);
     let (near, far) = (folder.path("near.png"), folder.path("far.png"));
-    // A jaw of the first grasp would hit the neighbour's ring; the other neighbour is out of reach.
+    // A jaw of the first grasp would touch the neighbour's ring; the other neighbour is too far away.
     pendulum_twice([59, -6]).save(&near).unwrap();
     pendulum_twice([-200, 100]).save(&far).unwrap();
     let printed = stdout(&["detect", "--grasp-model", &model, "--json", &near, &far]);
@@ -252,7 +252,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let words = stdout(&["detect", "--grasp-model", &model, &near, &far]);
     let told = words.lines().filter(|line| line.contains("warning: the jaws would touch the part at ("));
     assert!(told.clone().count() >= 1 && told.clone().all(|line| line.contains("near.png")), "{words}");
-    // A part outside the region is not considered.
+    // A part outside the region does not count.
     let alone = sdg(&["detect", "--grasp-model", &model, "--all", "--min-score", "1", "--json", &near]);
     let alone = lines(&alone);
     let listed = alone[0]["detections"].as_array().unwrap();

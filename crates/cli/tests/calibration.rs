@@ -1,4 +1,4 @@
-//! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file for `sdg detect --camera`,
+//! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file for `sdg detect --camera`;
 //! and rejected inputs.
 
 use std::fmt::Write;
@@ -16,14 +16,14 @@ use serde_json::Value;
 
 /// Maximum relative error of the focal length from 15 pictures.
 const MAX_FOCAL_ERROR: f64 = 0.002;
-/// Maximum error of the camera's position over the table, from 0.3 m, with that focal length error.
+/// Maximum error of the camera's position above the table, from 0.3 m, with that error of the focal length.
 const MAX_PLACE_ERROR_M: f64 = 0.001;
 
 fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(arguments)).unwrap()
 }
 
-/// Asserts the exit code, and a message with every part.
+/// Asserts the exit code, and a message that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = sdg(arguments);
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -57,7 +57,7 @@ impl Folder {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 fn translation(pose: &Value) -> Vector3<f64> {
@@ -70,7 +70,8 @@ fn attribute(element: &str, name: &str) -> Option<f64> {
     element.split_once(&format!(" {name}=\""))?.1.split_once('"')?.0.parse().ok()
 }
 
-/// The area printed by the SVG's squares and dots, by positions in squares from the first square's lower left corner.
+/// The area that the SVG's squares and dots print, by positions in squares from the lower left corner of the first
+/// square.
 fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
     let squares: Vec<[f64; 3]> = svg
         .lines()
@@ -85,7 +86,7 @@ fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
         .collect();
     assert_eq!(squares.len(), 27);
     let [left, top, side] = squares[0];
-    // There are millions of queries: only shapes near the position's cell are tested.
+    // There are millions of queries, so only shapes near the cell of the position are tested.
     const CELLS: usize = 32;
     let cell = move |value: f64, start: f64| ((value - start) / side).floor() + (CELLS / 2) as f64;
     let mut near = Vec::new();
@@ -148,7 +149,7 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     arguments.extend(pictures.iter().map(String::as_str));
     let found = json(&arguments);
     assert!((number(&found["intrinsics"]["fx"]) / camera.fx - 1.0).abs() < MAX_FOCAL_ERROR, "{found}");
-    // The file has the first pixel's centre at (0, 0).
+    // In the file, the first pixel's centre is at (0, 0).
     assert!((number(&found["intrinsics"]["cx"]) - (camera.cx - 0.5)).abs() < 1.0, "{found}");
     assert!(number(&found["rms_px"]) < 0.06 && number(&found["sigma"]["fx"]) > 0.0, "{found}");
     assert_eq!(found["pictures"].as_array().unwrap().len(), pictures.len());
@@ -177,7 +178,7 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     assert_eq!(in_base["frame"], "base");
     assert!((translation(&in_base["frame_from_camera"]) - expected).norm() < 1e-9, "{in_base}");
 
-    // The printer prints 100 mm as 98 mm: the camera is nearer.
+    // The printer prints 100 mm as 98 mm, so the camera is nearer.
     let scaled = json(&[&common[..], &["--measured-mm", "98", "--out", &based]].concat());
     assert!((translation(&scaled["frame_from_camera"]) - at * 0.98).norm() < 1e-6, "{scaled}");
 
@@ -198,7 +199,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     fs::create_dir(&frames).unwrap();
     let poses = poses(&camera);
     let mut random = Random(4);
-    // Each view twice, with pictures without the board in between.
+    // Each view twice, with pictures without the board between them.
     for (k, pose) in poses.iter().enumerate() {
         for copy in 0..2 {
             let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut random);
@@ -217,14 +218,14 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     assert!(output.status.success(), "{told}");
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     let used = found["pictures"].as_array().unwrap();
-    // No view is taken twice, and taking ends when nothing is missing.
+    // No view is taken twice, and taking ends when no view is missing.
     assert!((12..=poses.len()).contains(&used.len()), "{told}");
     assert_eq!(fs::read_dir(&taken).unwrap().count(), used.len());
     assert_eq!(told.lines().filter(|line| line.starts_with("taken: ")).count(), used.len(), "{told}");
     assert!(told.contains("; next: tilt the board another way"), "{told}");
     assert!((number(&found["intrinsics"]["fx"]) / camera.fx - 1.0).abs() < 2.0 * MAX_FOCAL_ERROR, "{found}");
     assert_eq!(found["advice"], serde_json::json!([]), "{found}");
-    // The pictures are kept, and give the same camera again.
+    // The pictures are kept, and give the same camera in a second calibration.
     let again = files.path("again.yaml");
     let pictures: Vec<String> = (0..used.len()).map(|k| format!("{taken}/{k:03}.png")).collect();
     let mut arguments = vec!["camera", "calibrate", "--out", &again, "--json"];
@@ -248,11 +249,11 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     assert_refused(
         &["camera", "calibrate", "--from", &from, "--taken", &taken, "--no-browser", "--out", &out],
         1,
-        &["the board was never seen at rest"],
+        &["the board was never at rest in a frame"],
     );
 }
 
-/// A phone: no lens distortion, never calibrated.
+/// A phone's camera, without lens distortion and never calibrated.
 const PHONE: PinholeCamera = PinholeCamera {
     width: 1280,
     height: 720,
@@ -280,8 +281,8 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
     assert_eq!(above["focal"]["source"], "guess");
     let cost = &above["focal_cost"];
     assert_eq!(number(&cost["mark_height_mm"]), 20.0);
-    // From straight above at 0.44 m (1108 px guessed for 1000): 20 mm above the table, 0.294 m beside the foot,
-    // 0.294 · 20 · (1 / (0.9 · 443) - 1 / 443) mm.
+    // From straight above at 0.44 m (1108 px assumed for 1000), for a point 20 mm above the table at a horizontal
+    // distance of 0.294 m: 0.294 · 20 · (1 / (0.9 · 443) - 1 / 443) mm.
     assert!((number(&cost["at_border_mm"]) - 1.47).abs() < 0.1, "{above}");
     assert!(number(&cost["at_sheet_mm"]) < 0.2, "{above}");
     assert_eq!(table("given.png", 0.0, &["--focal-px", "1000"])["focal"]["source"], "given");

@@ -12,7 +12,7 @@ use sdg_simulation::views::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
 /// The wrist camera in the pose of the shipped photos: straight down from 0.58 m; right in the picture is -y of the
-/// base.
+/// base frame.
 pub const WRIST_CAMERA: &str = include_str!("wrist.yaml");
 
 impl Folder {
@@ -63,12 +63,12 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     assert!((number(&pose["p_m"][0]) - (0.48 - (y - 240.0) * 0.564 / 550.0)).abs() < 1e-6, "{pose}");
     assert!((number(&pose["p_m"][1]) - -(x - 320.0) * 0.564 / 550.0).abs() < 1e-6, "{pose}");
     assert!((number(&pose["p_m"][2]) - 0.009).abs() < 1e-12, "{pose}");
-    // Right in the picture is -y of the base, down is -x: an angle a of the picture is a yaw of -90° - a.
+    // Right in the picture is -y of the base frame, and down is -x: an angle a in the picture is a yaw of -90° - a.
     let turn = number(&pose["yaw_deg"]) + 90.0 + number(&found["grasp"]["angle_deg"]);
     assert!((turn + 180.0).rem_euclid(360.0) - 180.0 < 1e-6, "{found}");
     let width = number(&found["grasp"]["width_px"]) * 0.564 / 550.0;
     assert!((number(&pose["opening_m"]) - width).abs() < 1e-6, "{found}");
-    // The photo that it was taught from, which is vertical: within a pixel, 1.03 mm.
+    // In the photo from which the model was taught, which is vertical, the error is within a pixel, 1.03 mm.
     assert!((0.01..1.03).contains(&number(&pose["sigma_mm"])), "{pose}");
     assert!((0.01..2.0).contains(&number(&pose["sigma_deg"])), "{pose}");
     let told = detect(&[]);
@@ -92,7 +92,7 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     assert_refused(&teach("text.yaml", "image_width: 640", "no camera"), 1, &["text.yaml", "camera_calibration"]);
     let table = WRIST_CAMERA.find("table:").unwrap();
     let alone = teach("alone.yaml", &WRIST_CAMERA[table..], "");
-    assert_refused(&alone, 1, &["alone.yaml", "pose over the table"]);
+    assert_refused(&alone, 1, &["alone.yaml", "pose above the table"]);
 
     let camera = files.text("wrist.yaml", WRIST_CAMERA);
     assert_refused(&files.teach("part.sdg", &["--camera", &camera]), 2, &["--mark-height-mm"]);
@@ -182,7 +182,7 @@ fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     let off = told["errors"]["median_mm"].as_f64().unwrap();
     assert!(off < 3.0, "{off} mm");
 
-    // The photo that it was taught from is not used as a test, in the plan view either.
+    // The photo from which the model was taught is not used as a test, in the plan view either.
     for (from, to) in [("image.png", "image.png"), ("annotation.json", "image.json")] {
         fs::copy(shipped("pendulum", from), Path::new(&folder).join(to)).unwrap();
     }

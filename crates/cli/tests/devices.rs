@@ -1,4 +1,4 @@
-//! `sdg devices`, and `--device` as called by a user, on all devices of this build.
+//! `sdg devices` and `--device`, called as a user would, on all devices of this build.
 
 use std::path::Path;
 

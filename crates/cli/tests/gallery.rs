@@ -22,10 +22,10 @@ const PARTS: [&str; 12] = [
     "circuit_board",
     "spring_clip",
 ];
-/// Seed of the samples, and the one of the tour's six in which much is refused.
+/// Seed of the samples, and number of the one of the tour's six in which many detections are refused.
 const SEED: &str = "3";
 const SAMPLE: &str = "000003.png";
-/// Small pictures in a row of the sheet, and their size.
+/// Number of small pictures in a row of the sheet, and their size.
 const COLUMNS: u32 = 4;
 const SMALL: [u32; 2] = [240, 180];
 
@@ -33,7 +33,8 @@ fn pictures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/pictures")
 }
 
-/// Teaches model S of a shipped part, draws six held-back samples, and gives the folder with what was found drawn on them.
+/// Teaches model S of a shipped part, makes six held-out samples, and returns the folder with the detections drawn on
+/// them.
 fn drawn_samples(folder: &Folder, part: &str, arguments: &[&str]) -> PathBuf {
     let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped(part, name).display().to_string());
     let demo = format!("{photo}:{marks}");
@@ -54,7 +55,7 @@ fn pictures_of_the_gallery() {
     let rows = PARTS.len() as u32 / COLUMNS;
     let mut sheet = RgbImage::from_pixel(COLUMNS * SMALL[0], rows * SMALL[1], Rgb([255, 255, 255]));
     for (idx, part) in (0..).zip(PARTS) {
-        // In the second sample every part is found.
+        // In the second sample, all parts are found.
         let drawn = image::open(drawn_samples(&folder, part, &[]).join("000001.png")).unwrap().into_rgb8();
         let small = image::imageops::resize(&drawn, SMALL[0] - 4, SMALL[1] - 4, FilterType::Triangle);
         let [x, y] = [idx % COLUMNS * SMALL[0] + 2, idx / COLUMNS * SMALL[1] + 2];

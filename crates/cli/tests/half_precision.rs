@@ -1,9 +1,9 @@
-//! `sdg weights convert --f16`: a trained network's detections against those of full precision.
+//! `sdg weights convert --f16`: the detections of a trained network, compared with those in full precision.
 //!
 //! Rounding to half precision moves every box a little. Non-maximum suppression keeps the highest score of overlapping
-//! boxes; if two scores nearly tie, rounding may change which one is kept, although no box has moved. So each detection
-//! is compared with the same candidate before suppression, and changes of the kept box are counted separately: each
-//! must be a tie.
+//! boxes; if two scores are nearly equal, rounding may change which box is kept, although no box has moved. Each
+//! detection is therefore compared with the same candidate before suppression, and changes of the kept box are counted
+//! separately: each must be a tie.
 
 use std::cell::LazyCell;
 use std::collections::HashMap;
@@ -26,9 +26,9 @@ use sdg_training::{Outcome, SampleSource, TrainingConfig, ValidationConfig, trai
 const MAX_PX: f64 = 0.1;
 /// Minimum score of detections that are compared.
 const SURE: f64 = 0.5;
-/// Scores within this difference tie.
+/// Maximum difference of two scores that tie.
 const TIE: f64 = 2e-3;
-/// Training steps: enough to detect most parts with a high score.
+/// Number of training steps, enough to detect most parts with a high score.
 const STEPS: usize = 90;
 /// Number of unseen pictures, with and without parts.
 const PICTURES: u64 = 30;
@@ -82,7 +82,7 @@ fn converted(checkpoint: &Path, network: &RcnnConfig, flags: &[&str]) -> (u64, s
     (std::fs::metadata(&out).unwrap().len(), base.parameters)
 }
 
-/// A detector, and the same without suppression, which gives all candidates.
+/// A detector, and the same detector without suppression, which gives all candidates.
 struct Detector {
     whole: GeneralizedRcnn,
     unsuppressed: GeneralizedRcnn,
@@ -126,12 +126,12 @@ fn nearest(found: &Detections, i: usize, among: &Detections) -> Option<usize> {
     (0..among.boxes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// Effects of rounding on the detections of all pictures.
+/// The effects of rounding on the detections of all pictures.
 #[derive(Debug, Default)]
 struct Comparison {
     /// Number of detections in full precision.
     sure: usize,
-    /// Of those, the number replaced by a neighbour whose score differs by less than [`TIE`].
+    /// Number of these that are replaced by a neighbour whose score differs by less than [`TIE`].
     ties: usize,
     box_px: f64,
     keypoint_px: f64,
@@ -154,7 +154,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
             } else {
                 made.ties += 1;
                 let [neighbours, candidates] = &*unsuppressed;
-                // The neighbour that is kept instead had the same score before rounding too.
+                // Before rounding, the neighbour that is kept instead had nearly the same score as well.
                 let other = nearest(&found, j, neighbours).unwrap();
                 let margin = expected.scores[i] - neighbours.scores[other];
                 println!("a tie: {:.5} and {:.5}", expected.scores[i], neighbours.scores[other]);

@@ -3,9 +3,11 @@
 use crate::support::{shipped, stdout};
 use serde_json::Value;
 
-/// The file, and the grasp on the part's shipped photo as its writer found it: position in pixels and angle in degrees.
+/// The file, and the grasp on the part's shipped photo as found by the program that wrote it: position in pixels and
+/// angle in degrees.
 const KEPT: [(&str, [f64; 3]); 1] = [("pendulum-shape-format-3", [320.024685, 220.452129, -141.544785])];
-/// Pixels and degrees: far more than differences between instruction sets, far less than is relevant for a grasp.
+/// Tolerances in pixels and degrees: much larger than differences between instruction sets, and much smaller than what
+/// matters for a grasp.
 const TOLERANCE: f64 = 0.01;
 
 #[test]

@@ -1,4 +1,4 @@
-//! `sdg evaluate --pictures`: counts, against a naive reference and in both formats; wrong folders.
+//! `sdg evaluate --pictures`: counts in both formats, compared with a naive reference; and wrong folders.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
-/// Number of samples: enough that some lack the part and some show it cut by the border.
+/// Number of samples, enough that some lack the part and some show it partly outside the picture.
 const NUM_SAMPLES: usize = 20;
 
 fn text(path: &Path) -> &str {
@@ -31,7 +31,7 @@ fn evaluate(pictures: &Path, model: &Path, report: &Path, more: &[&str]) -> Valu
     serde_json::from_str(&stdout(&arguments)).unwrap()
 }
 
-/// An instance of the pendulum: middle of its marks in pixels, their direction in degrees, their length, and whether it
+/// An instance of the pendulum: centre of its marks in pixels, their direction in degrees, their length, and whether it
 /// is optional.
 struct Marked {
     x: f64,
@@ -70,7 +70,7 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let [mut parts, mut found, mut wrong, mut negatives, mut false_alarms] = [0; 5];
     for image in file["images"].as_array().unwrap() {
         let picture = samples.join(image["file_name"].as_str().unwrap());
-        // Exit code 3, nothing to grasp, is a valid answer too.
+        // Exit code 3, nothing to grasp, is a valid answer as well.
         let printed = sdg(&["detect", "--grasp-model", text(model), "--json", text(&picture)]).stdout;
         let printed: Value = serde_json::from_slice(&printed).unwrap();
         let detections = printed["detections"].as_array().unwrap();
@@ -163,14 +163,14 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     let expected = counted_naively(&samples, &model);
     assert_eq!(counts(&evaluated), expected);
     let [parts, found, _, negatives, _] = expected;
-    // Otherwise nothing would have been compared.
+    // Otherwise there would have been nothing to compare.
     assert!(found > 0 && negatives > 0 && parts > found / 2, "{expected:?}");
     assert_eq!(evaluated["pictures"].as_array().unwrap().len(), NUM_SAMPLES);
     assert_eq!(evaluated["missed"], json!(parts - found));
     let html = fs::read_to_string(report.join("index.html")).unwrap();
     assert!(html.contains("000019.png") && html.contains("<svg"), "every picture and a chart are on the page");
 
-    // At 0.5 the sweep equals the totals, and a limit of 1 finds nothing.
+    // At 0.5 the sweep equals the totals, and at 1 no detection is accepted.
     let at = |min_score: f64| {
         let swept = evaluated["by_min_score"].as_array().unwrap();
         swept.iter().find(|at| at["min_score"] == json!(min_score)).unwrap()
@@ -179,7 +179,7 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     assert_eq!(at(0.5)["false_alarms"], evaluated["false_alarms"]);
     assert!(at(0.0)["found"].as_u64() >= at(0.5)["found"].as_u64());
 
-    // The same marks in the other format, with the photo that the model was taught from and another program's JSON in
+    // The same marks in the other format, with the photo from which the model was taught and another program's JSON in
     // the folder.
     let labelme = folder.path().join("labelme");
     write_labelme(&samples, &labelme);
@@ -253,8 +253,8 @@ fn instance(label: &str, group: u32, x: f64) -> Vec<Value> {
     ]
 }
 
-/// The shipped photo rotated by quarter turns, with its marks shifted along their direction by a share of their length,
-/// as LabelMe.
+/// The shipped photo rotated by multiples of 90°, with its marks shifted along their direction by a fraction of their
+/// length, as LabelMe.
 fn write_turned(folder: &Path, name: &str, quarters: u32, along: f64) {
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
     let mut photo = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
@@ -291,7 +291,7 @@ fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
     let model = teach(folder.path());
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
-    // Saved as JPEG under another name, it is still recognised as the photo that the model was taught from.
+    // Saved as JPEG under another name, it is still recognised as the photo from which the model was taught.
     write_turned(&pictures, "copy.jpg", 0, 0.0);
     for quarters in 1..4 {
         write_turned(&pictures, &format!("turned-{quarters}.png"), quarters, 0.8);

@@ -35,7 +35,7 @@ fn a_folder_is_played_and_its_part_followed() {
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
     fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
-    // Three seconds, during which searches take as long as the machine's load requires.
+    // In these three seconds, searches take as long as the machine's load requires.
     let from = format!("dir:{}?loop&fps=25", pictures.display());
     let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "75", "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -59,7 +59,7 @@ fn a_folder_is_played_and_its_part_followed() {
     assert!(told.lines().count() == 2 && told.starts_with("frame 0: grasp at ("), "{told}");
 }
 
-/// The demonstration's part at several places in turn, and once absent, as PNG.
+/// The demonstration's part at several positions, one after another, and once absent, as PNG.
 fn unrelated_pictures() -> Vec<Vec<u8>> {
     let photo = image::open(shipped("pendulum", "image.png")).unwrap();
     let table = RgbImage::from_pixel(photo.width(), photo.height(), *photo.to_rgb8().get_pixel(3, 3));
@@ -74,7 +74,7 @@ fn unrelated_pictures() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// The grasps' positions in a line.
+/// The positions of the grasps in a line.
 fn grasps(line: &Value) -> Vec<Value> {
     line["detections"].as_array().unwrap().iter().map(|detection| detection["grasp"].clone()).collect()
 }
@@ -162,7 +162,7 @@ fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
     let words = String::from_utf8(detect(&[&right], &[]).stdout).unwrap();
     assert!(words.contains("part 1 found again, ") || words.contains("part 1 followed, "), "{words}");
 
-    // A stream with another size never finds anything: that is an error.
+    // In a stream of another size, no part would ever be found: this is an error.
     let output = detect(&[&small, &small], &[]);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{error}");
@@ -228,7 +228,7 @@ fn drawn_frames_are_served_to_browsers() {
     BufReader::new(child.stderr.take().unwrap()).read_line(&mut first).unwrap();
     let url = first.trim().strip_prefix("pictures at http://").unwrap_or_else(|| panic!("{first}"));
     let host = url.trim_end_matches('/');
-    // Until the first frame is drawn there is no picture to fetch.
+    // There is no picture until the first frame is drawn.
     let picture = (0..100).find_map(|_| {
         let mut stream = TcpStream::connect(host).ok()?;
         write!(stream, "GET /snapshot.jpg HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").ok()?;

@@ -12,7 +12,7 @@ fn lines(output: &Output) -> Vec<Value> {
     String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Asserts the exit code, and one line on standard error with every part.
+/// Asserts the exit code, and one line on standard error that contains every part.
 fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{stderr}");
@@ -73,7 +73,7 @@ fn one_frame_goes_to_a_file_and_several_to_a_folder() {
 #[test]
 fn frames_come_at_their_times_and_are_the_newest() {
     let out = tempfile::tempdir().unwrap();
-    // Ten pictures per second; each is 10 levels brighter than the one before.
+    // Ten pictures per second; each is 10 levels brighter than the previous one.
     let picture =
         |level: u32| format!("printf 'P6 1 1 255 '; printf '\\\\{level:o}\\\\{level:o}\\\\{level:o}'; sleep 0.1;");
     let script: String = (1..20).map(|i| picture(i * 10)).collect();
@@ -87,7 +87,7 @@ fn frames_come_at_their_times_and_are_the_newest() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(start.elapsed().as_secs_f64() >= 1.0);
     let numbers: Vec<u64> = lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect();
-    // Half a second is five pictures, fewer on a busy machine; without skipping they would be 0, 1, 2.
+    // Half a second is five pictures, fewer on a busy machine. Without skipping, the pictures would be 0, 1, 2.
     assert!(numbers[1] >= numbers[0] + 2 && numbers[2] >= numbers[1] + 2, "{numbers:?}");
 }
 
@@ -104,7 +104,7 @@ fn watch_tells_rate_brightness_and_faults() {
     assert!(fps > 5.0 && fps < 52.0, "{fps}");
     assert!(told[0]["faults"].as_array().unwrap().is_empty(), "files may repeat: {}", told[0]);
 
-    // The same picture repeated by a live camera, and black pictures.
+    // A live camera that repeats the same picture, and black pictures.
     let watch = |line: &str| {
         let address = format!("cmd:yes '{line}'");
         let output = sdg(&["camera", "watch", "--from", &address, "--seconds", "1.2"]);
@@ -123,7 +123,7 @@ fn cameras_that_are_none_are_refused() {
         sdg(&[&["camera", "grab", "--out", out.to_str().unwrap(), "--from", address], further].concat())
     };
     assert_refused(&grab("/dev/video0", &[]), 2, &["expected an address of a camera", "/dev/video0"]);
-    assert_refused(&grab("https://camera/", &[]), 2, &["TLS"]);
+    assert_refused(&grab("https://camera/", &[]), 2, &["https is not supported"]);
     assert_refused(&grab("dir:/nowhere", &[]), 1, &["--from", "dir:/nowhere", "expected a folder"]);
     assert_refused(&grab("v4l:/dev/null", &[]), 1, &["v4l:/dev/null", "does not open"]);
     assert_refused(&grab("cmd:no-such-program", &[]), 1, &["cannot be started"]);

@@ -17,7 +17,7 @@ fn demonstrations(folder: &Folder) -> String {
     };
     copy("pendulum", "lever.png");
     copy("rod_end", "rod_end.png");
-    // Several photos of one part are in a folder with its name.
+    // Several photos of one part are in a folder that has its name.
     copy("pendulum", "twin/first.png");
     fs::copy(shipped("key", "image.png"), Path::new(&demos).join("unmarked.png")).unwrap();
     demos
@@ -47,12 +47,12 @@ fn parts_that_look_alike_are_told() {
         assert!(Path::new(&out).join(format!("models/{part}.sdg")).exists());
     }
     let page = fs::read_to_string(found["report"].as_str().unwrap()).unwrap();
-    assert!(page.contains("3 parts taught") && page.contains("Which look alike"));
+    assert!(page.contains("3 parts taught") && page.contains("Look-alikes"));
     // The page shows each part's photo with the detections of its model.
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }
-    // Existing models are reused with their times; with another seed they would not be.
+    // Existing models are reused with their times; with another seed they are taught again.
     assert_eq!(record("twin"), twin);
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");

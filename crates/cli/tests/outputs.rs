@@ -1,4 +1,4 @@
-//! No output replaces an input of the command, and a model replaces only a model.
+//! No output replaces an input of the command, and a model only replaces a model.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ fn photographed() -> (Folder, String, String) {
     (folder, photo, marks)
 }
 
-/// Asserts that the call fails with one line that contains `part`, and changes none of the files.
+/// Asserts that the call fails with one line that contains `part`, and that no file changes.
 fn refused(arguments: &[&str], part: &str, files: &[&str]) {
     let before: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
     let output = sdg(arguments);
@@ -33,7 +33,7 @@ fn a_model_replaces_neither_photo_nor_marks_nor_other_files() {
     }
     let notes = folder.text("notes.sdg", "not a model");
     refused(&[&teach[..], &[&notes]].concat(), "a grasp model to replace", &[&notes]);
-    // A model may be replaced, and so may an empty file as made by mktemp.
+    // A model may be replaced, and so may an empty file, such as one made by mktemp.
     let model = folder.text("model.sdg", "");
     for _ in 0..2 {
         stdout(&[&teach[..], &[&model]].concat());

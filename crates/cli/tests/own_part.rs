@@ -1,9 +1,9 @@
-//! `sdg rehearse` with the part that a model was taught from.
+//! `sdg rehearse` with the part from which the model was taught.
 
 use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
-/// Model S of the lever, 166 mm long and 16 mm high; the model knows neither size.
+/// Model S of the lever, which is 166 mm long and 16 mm high; the model knows neither size.
 fn taught(folder: &Folder) -> String {
     let model = folder.path("model.sdg");
     taught_pendulum(&model, None);

@@ -1,4 +1,4 @@
-//! Pictures in the formats of cameras and programs: the result does not depend on the storage format or the way of
+//! Pictures in the formats of cameras and programs: the result depends neither on the storage format nor on the way of
 //! opening.
 
 use std::fs;
@@ -43,7 +43,7 @@ pub(crate) fn with_orientation(picture: &DynamicImage, orientation: u8) -> Vec<u
     jpeg
 }
 
-/// The stored pixels for which this orientation shows the picture: the inverse of the orientation.
+/// The stored pixels that this orientation shows as the picture: the inverse of the orientation.
 pub(crate) fn stored_for(picture: &RgbImage, orientation: u8) -> DynamicImage {
     let picture = DynamicImage::from(picture.clone());
     match orientation {
@@ -144,7 +144,7 @@ fn marks_made_on_unturned_pixels_are_told() {
         let heeded = teach(with_orientation(&stored_for(&photo(), orientation), orientation));
         let told = String::from_utf8_lossy(&heeded.stderr).into_owned();
         assert!(
-            heeded.status.success() && told.contains("turned as its Exif orientation says"),
+            heeded.status.success() && told.contains("rotated as its Exif orientation says"),
             "{orientation}: {told}"
         );
     }

@@ -33,12 +33,12 @@ fn a_path_leads_around_the_wall_and_is_told_and_drawn() {
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{told}");
     assert!(told.contains("not straight, because on the straight motion") && told.contains("inside wall"), "{told}");
-    assert!(told.contains("1. to joints (") && told.contains("goal 1, turned by"), "{told}");
+    assert!(told.contains("1. to joints (") && told.contains("goal 1, rotated by"), "{told}");
     let gif = fs::read(Path::new(&out).join("plan.gif")).unwrap();
     assert!(gif.starts_with(b"GIF89a") && gif.len() > 20_000, "{} bytes", gif.len());
     assert!(Path::new(&out).join("plan.png").exists());
 
-    // The printed path, followed in MuJoCo, ends at the goal and touches nothing.
+    // The printed path, followed in MuJoCo, ends at the goal without any contact.
     let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
     let joints = |value: &Value| {
         let degrees: Vec<f64> = serde_json::from_value(value.clone()).unwrap();

@@ -99,7 +99,7 @@ fn signature(arg: &Arg) -> String {
     format!("`{dashes}{values}").trim_end().replace('|', "\\|") + several + "`"
 }
 
-/// The help, what is taken without the option, and the values that it may have.
+/// The help, the default, and the possible values.
 fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
     let mut meaning = sentence(&in_markdown(&help)).replace('|', "\\|");
@@ -123,7 +123,7 @@ fn meaning(arg: &Arg) -> String {
     meaning
 }
 
-/// On one line, with what Markdown would take for an element of HTML as text.
+/// The text on one line, with characters escaped that Markdown would read as an HTML element.
 fn in_markdown(help: &str) -> String {
     help.split_whitespace().collect::<Vec<_>>().join(" ").replace('<', "\\<").replace('*', "\\*")
 }

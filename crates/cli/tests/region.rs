@@ -50,7 +50,7 @@ fn only_the_region_is_searched_and_places_are_those_of_the_picture() {
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("nothing") && told.contains("in 200 × 200 pixels from (10, 10)"), "{told}");
     assert_eq!(output.status.code(), Some(3));
-    // The frame is drawn.
+    // The border of the region is drawn.
     let drawn = image::open(folder.path("drawn/image.png")).unwrap().into_rgb8();
     let original = image::open(photo()).unwrap().into_rgb8();
     let changed = |x: u32| (10..210).filter(|&y| drawn.get_pixel(x, y) != original.get_pixel(x, y)).count();
@@ -124,7 +124,7 @@ fn with_a_camera_the_region_is_one_of_its_pictures() {
     let outside =
         refusal(&["detect", "--grasp-model", &model, "--camera", &camera, "--region", "600,0,100,100", &photo()]);
     assert!(outside.1.contains("--region: expected a region within the picture of 640 × 480"), "{}", outside.1);
-    // Taught with the camera too.
+    // Taught with a camera as well.
     let again = folder.path("again.sdg");
     let demo = format!("{}:{}", photo(), shipped("pendulum", "annotation.json").display());
     let teach = |region: &str| {
@@ -145,7 +145,7 @@ fn an_evaluation_leaves_pictures_of_another_size_out() {
     assert!(sdg(&["teach", "--model", "S", "--demo", &demo, "--region", ON_IT, "--out", &model]).status.success());
     std::fs::create_dir(&pictures).unwrap();
     let image = image::open(photo()).unwrap();
-    // Not the photo itself, which would be left out because the model was taught from it.
+    // A changed copy, because the photo itself would be left out: the model was taught from it.
     image.brighten(12).save(format!("{pictures}/same.png")).unwrap();
     image.thumbnail(320, 240).save(format!("{pictures}/small.png")).unwrap();
     for (name, side) in [("same", [640, 480]), ("small", [320, 240])] {
@@ -168,7 +168,7 @@ fn wrong_regions_are_one_clear_error_each() {
         ("10,10,0,50", 2, "a width and a height of at least 1 pixel, found 0 and 50"),
         ("10,10,50", 2, "X,Y,W,H in whole pixels"),
         ("1.5,2,30,40", 2, "X,Y,W,H in whole pixels"),
-        ("everything", 2, "or all, for all of the picture"),
+        ("everything", 2, "or `all` for the whole picture"),
         ("600,10,100,100", 1, "within the picture of 640 × 480 pixels, found 100 × 100 pixels from (600, 10)"),
         ("300,200,60,40", 1, "a region that the part fits in"),
     ] {
@@ -176,7 +176,7 @@ fn wrong_regions_are_one_clear_error_each() {
         assert!(found == Some(code) && error.contains(part), "{region}: {found:?} {error}");
         assert_eq!(error.matches("expected").count(), 1, "one error: {error}");
     }
-    // A folder read as a camera: none of its pictures can be searched.
+    // A folder read as a camera, in which no picture can be searched.
     let from = format!("dir:{}", shipped("pendulum", "image.png").parent().unwrap().display());
     let output =
         sdg(&["detect", "--grasp-model", &model, "--from", &from, "--region", "600,10,100,100", "--every-frame"]);

@@ -58,7 +58,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert!(stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
-    // The part is drawn in the picture, in its colour: about ten millimetres of it at this size.
+    // The part is drawn in the picture in its colour; about ten millimetres of it are visible at this size.
     let drawn = image::open(out.join("dry-run.png")).unwrap().into_rgb8();
     let is_part = |pixel: &image::Rgb<u8>| pixel[0] > 120 && pixel[0] > pixel[1] + 50 && pixel[1] > pixel[2] + 20;
     let num_part = drawn.pixels().filter(|pixel| is_part(pixel)).count();
@@ -157,7 +157,7 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&nowhere, &sim, 1, &["nowhere.toml: line 30: missing field `at_mm`"]);
     let model_name = write("robot.toml", "\"panda\"", "\"ur5\"");
     grasp(&model_name, &sim, 1, &["robot.toml: line 6: model: expected \"panda\" or \"fr3\", found \"ur5\""]);
-    // The camera's file is searched in the workcell file's folder.
+    // The path of the camera file is relative to the workcell file's folder.
     let moved = write("moved.toml", "format = 1", "format = 1");
     grasp(&moved, &sim, 1, &["camera.yaml"]);
     let base = write("base.toml", "\"hand\"", "\"base\"");
@@ -249,7 +249,7 @@ fn a_robot_of_another_model_than_the_workcells_is_refused() {
     assert_refused(&arguments, 1, &[expected]);
 }
 
-/// The same command as for a real arm: a live camera beside the robot, detection, the arm over TCP and UDP.
+/// The same command as for a real arm: a live camera beside the robot, detection, and the arm over TCP and UDP.
 #[test]
 fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     const SEED: u64 = 3;
@@ -274,7 +274,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let mut aside = ready_pose();
     aside[0] = 1.6;
     cell.reset(&aside).unwrap();
-    // Two pictures in turn: a camera that repeats the same bits is reported as frozen.
+    // Two alternating pictures, because a camera that repeats the same bits is reported as frozen.
     let mut picture = cell.wrist_view().unwrap().image;
     picture.save(file("0.png")).unwrap();
     picture.put_pixel(0, 0, image::Rgb([1, 2, 3]));
@@ -292,7 +292,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let simulated = Simulated::start(&["--object", "pendulum", "--seed", "3"]);
     let from = format!("cmd:sh {}", frames.display());
     let (workcell, states) = (file("workcell.toml"), file("states.csv"));
-    // A slow machine must not fail the test: the part does not move.
+    // A slow machine must not fail the test; the part does not move.
     let grasp = [
         "grasp",
         "--robot",

@@ -1,5 +1,5 @@
-//! Programs and robots that fail during a motion: the arm stops, one line gives the reason, and nothing moves until a
-//! person confirms.
+//! Failures of programs and robots during a motion: the arm stops, one line gives the reason, and the arm does not move
+//! until a person confirms.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -22,8 +22,8 @@ fn workcell(folder: &Path) -> PathBuf {
     path
 }
 
-/// Times after the start at which the motion is disturbed. If the program had not begun to move by then, the next time
-/// is tried: how soon it begins depends on the machine.
+/// Times after the start at which the motion is disturbed. If the motion has not begun by then, the next time is tried:
+/// when it begins depends on the machine.
 const MOVING: [Duration; 5] = [
     Duration::from_millis(500),
     Duration::from_secs(1),
@@ -32,7 +32,7 @@ const MOVING: [Duration; 5] = [
     Duration::from_secs(8),
 ];
 
-/// Tries these times until a motion was in progress.
+/// Tries these times until the motion was in progress.
 fn once_moving<T>(attempt: impl FnMut(Duration) -> Option<T>) -> T {
     MOVING.into_iter().find_map(attempt).expect("the arm moves within 8 s")
 }
@@ -65,7 +65,7 @@ impl Moving {
         assert!(sent.success());
     }
 
-    /// Its remaining output and its exit code.
+    /// The remaining output and the exit code.
     fn finish(mut self) -> (String, Option<i32>) {
         let mut text = String::new();
         self.stderr.read_to_string(&mut text).unwrap();
@@ -82,7 +82,7 @@ fn state(simulated: &Simulated) -> (Vec<f64>, String) {
     (joints, line["mode"].as_str().unwrap().to_owned())
 }
 
-/// Whether the arm has left its start and not reached the end.
+/// Whether the arm has left its start but not reached the end.
 fn is_on_its_way(simulated: &Simulated) -> bool {
     (1e-4..0.8).contains(&state(simulated).0[0])
 }

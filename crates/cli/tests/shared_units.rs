@@ -1,5 +1,5 @@
-//! An evaluation's units shared by several processes, with model S on one part: the tables equal those of the ordinary
-//! run, and missing, failed, stale or duplicate units prevent the tables.
+//! The units of an evaluation divided among several processes, with model S on one part: the tables equal those of the
+//! ordinary run, and missing, failed, stale or duplicate units prevent the tables.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
@@ -49,7 +49,7 @@ fn error_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Standard error of a call that fails with this code; it contains all of `parts`.
+/// Standard error of a call that fails with this code; it must contain all of `parts`.
 fn refused(output: &Output, code: i32, parts: &[&str]) -> String {
     let error = error_of(output);
     assert_eq!(output.status.code(), Some(code), "{error}");
@@ -59,7 +59,7 @@ fn refused(output: &Output, code: i32, parts: &[&str]) -> String {
     error
 }
 
-/// A JSON object without values that differ between runs: times, and sizes of files that contain times.
+/// A JSON object without the values that differ between runs: times, and sizes of files that contain times.
 fn timeless(value: Value) -> Value {
     const TIMES: [&str; 6] =
         ["seconds", "teaching_secs", "longest_teaching_secs", "frames_per_second", "bytes", "largest_bytes"];
@@ -126,7 +126,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
     assert!(!Path::new(&shared).exists(), "listing makes nothing");
 
     json(&evaluate(&shared, &["--unit", TEACH]));
-    // Nothing is counted before all units are done, and each missing unit is named.
+    // No tables are made before all units are done, and each missing unit is named.
     let error =
         refused(&evaluate(&shared, &["--collect"]), 1, &["3 of 4 units cannot be counted", "look-rod_end: missing"]);
     assert!(error.contains("grasp-S-rod_end: missing") && error.contains("time-rod_end: missing"), "{error}");
@@ -135,7 +135,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
     assert_eq!((&watched["units"], &watched["done"], &watched["waiting"]), (&4.into(), &1.into(), &3.into()));
     assert!(watched["seconds_left"].as_f64().unwrap() > 0.0 && watched["is_settled"] == false);
 
-    // Two processes at once in one folder.
+    // Two processes in one folder at the same time.
     let begin = |unit: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
         command.args(arguments(&shared, &["--unit", unit])).stdout(Stdio::null()).stderr(Stdio::piped());
@@ -187,12 +187,12 @@ fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
     assert_eq!(json(&without_mujoco(&[TEACH]))["units"][0]["ended"], "done");
 }
 
-/// Faults of a folder in which all units are done.
+/// Faults in a folder in which all units are done.
 fn damaged_results_are_refused(shared: &str) {
     let at = |name: &str| Path::new(shared).join(name);
     let is_refused = |parts: &[&str]| refused(&evaluate(shared, &["--collect"]), 1, parts);
 
-    // Other settings: the teaching does not depend on the number of pictures.
+    // With other settings; the teaching does not depend on the number of pictures.
     let with_two_views = |more: &[&str]| {
         let mut arguments = arguments(shared, more);
         let views = arguments.iter().position(|argument| *argument == "--views").unwrap();
@@ -210,7 +210,7 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["look-rod_end: duplicate: done by", "1 of 4 units"]);
     fs::remove_file(second).unwrap();
 
-    // A file that differs from its receipt, and a missing one.
+    // One file differs from its receipt, another is missing.
     let (file, kept) = (at("cells/S-rod_end.look.json"), at("cells/kept"));
     fs::copy(&file, &kept).unwrap();
     fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
@@ -219,7 +219,7 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is gone"]);
     fs::rename(&kept, &file).unwrap();
 
-    // Results of another program version: one of them, and all.
+    // Results of another program version: one result, and then all of them.
     let whole = fs::read_to_string(&receipt).unwrap();
     let program = record(&receipt)["settings"]["program"].as_str().unwrap().to_owned();
     assert_eq!(program.len(), 64);
@@ -231,10 +231,10 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["settings.json: made with other settings (program: expected"]);
     fs::write(at("settings.json"), settings).unwrap();
 
-    // Two collectors at once, and a collector beside an ordinary run.
+    // Two collectors at the same time, and a collector beside an ordinary run.
     let lock = File::create(at(".collect.lock")).unwrap();
     lock.lock().unwrap();
-    is_refused(&["another --collect is at work in this folder"]);
+    is_refused(&["another --collect is running in this folder"]);
     drop(lock);
     let lock = File::open(at(".lock")).unwrap();
     lock.lock().unwrap();
@@ -248,7 +248,11 @@ fn failures_are_recorded_and_told() {
     let folder = Folder::new();
     let out = folder.path("run");
     // A unit without its teaching cannot run.
-    refused(&evaluate(&out, &["--unit", GRASP]), 1, &["expected teach-S-rod_end to be done before", "is it shared"]);
+    refused(
+        &evaluate(&out, &["--unit", GRASP]),
+        1,
+        &["expected teach-S-rod_end to be done before", "all machines use the same one"],
+    );
     // A folder in place of a file: even root cannot write it.
     let obstacle = Path::new(&out).join("cells/S-rod_end.teaching.json");
     fs::create_dir(&obstacle).unwrap();
@@ -276,7 +280,7 @@ fn failures_are_recorded_and_told() {
     fs::write(unit.join("running.json"), running).unwrap();
     let lock = File::create(unit.join("lock")).unwrap();
     lock.lock().unwrap();
-    refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still at work on n7 (process 12, job 31)"]);
+    refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still running on n7 (process 12, job 31)"]);
     let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
     assert_eq!((&watched["running"][0]["unit"], &watched["running"][0]["by"]["host"]), (&LOOK.into(), &"n7".into()));
     // A second process for the same unit waits until it is free.
@@ -285,7 +289,10 @@ fn failures_are_recorded_and_told() {
     let mut waiting = command.spawn().unwrap();
     let mut told = String::new();
     BufReader::new(waiting.stderr.as_mut().unwrap()).read_line(&mut told).unwrap();
-    assert!(told.starts_with("look-rod_end: at work elsewhere, by n7 (process 12, job 31); waiting"), "{told}");
+    assert!(
+        told.starts_with("look-rod_end: running in another process, by n7 (process 12, job 31); waiting"),
+        "{told}"
+    );
     assert!(waiting.try_wait().unwrap().is_none());
     drop(lock);
     // Then it begins, and reports what is missing.

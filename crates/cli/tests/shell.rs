@@ -104,7 +104,7 @@ fn teaching_leaves_a_page() {
     let line: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(line["report"].as_str(), Some(at("report/index.html").as_str()));
     let page = fs::read_to_string(at("report/index.html")).unwrap();
-    for part in ["Demonstration", "As marked", "Tried", "the part is here; score", "sdg teach --model S", "<img"] {
+    for part in ["Demonstration", "As marked", "Tried", "with the part; score", "sdg teach --model S", "<img"] {
         assert!(page.contains(part), "{part}");
     }
 }

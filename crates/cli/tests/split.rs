@@ -1,4 +1,5 @@
-//! `truth.json` and `sdg evaluate --split`: figures against an independent implementation, `--tuned`, wrong files.
+//! `truth.json` and `sdg evaluate --split`: results compared with an independent implementation, `--tuned`, and wrong
+//! files.
 
 use std::fs;
 use std::path::Path;
@@ -6,14 +7,14 @@ use std::path::Path;
 use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
-/// Number of samples: enough that some with each change of [`write_set`] are accepted, and some unchanged ones.
+/// Number of samples, enough that some with each change of [`write_set`] are accepted, and some unchanged ones.
 const NUM_SAMPLES: &str = "20";
 
 fn read_json(path: &str) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// A set of the pendulum with a truth that differs from the samples' own marks in known ways.
+/// A set of the pendulum with a ground truth that differs from the samples' own marks in known ways.
 fn write_set(folder: &Folder, name: &str) -> String {
     let set = folder.path(name);
     let [photo, marks] = ["image.png", "annotation.json"].map(|file| shipped("pendulum", file).display().to_string());
@@ -60,7 +61,7 @@ fn write_set(folder: &Folder, name: &str) -> String {
     set
 }
 
-/// A split of that set and a second set on the reported side, whose folder does not exist.
+/// A split with that set and with a second set on the reported side, whose folder does not exist.
 fn write_split(folder: &Folder) -> String {
     let set = |name: &str, side: &str| {
         format!("[[set]]\nname = \"{name}\"\nside = \"{side}\"\nfolder = \"{name}\"\ndemo = \"demo.png\"\n")
@@ -68,13 +69,13 @@ fn write_split(folder: &Folder) -> String {
     folder.text("split.toml", &(set("lever", "tuned") + &set("gone", "reported")))
 }
 
-/// Parts, found, accepted on pictures with the part, wrong, pictures without it, false alarms: by the rule of the sets'
-/// own scripts, from the output of `sdg detect`.
+/// Parts, found, accepted in pictures with the part, wrong, pictures without the part, false alarms: by the rule of the
+/// sets' own scripts, from the output of `sdg detect`.
 fn counted_naively(set: &str, model: &str) -> [u64; 6] {
     let [mut parts, mut found, mut accepted, mut wrong, mut negatives, mut false_alarms] = [0; 6];
     for entry in read_json(&format!("{set}/truth.json")).as_array().unwrap() {
         let picture = format!("{set}/{}", entry["image"].as_str().unwrap());
-        // Exit code 3, nothing to grasp, is a valid answer too.
+        // Exit code 3, nothing to grasp, is a valid answer as well.
         let printed = sdg(&["detect", "--grasp-model", model, "--json", &picture]).stdout;
         let printed: Value = serde_json::from_slice(&printed).unwrap();
         let detections = printed["detections"].as_array().unwrap();

@@ -1,8 +1,8 @@
-//! A timed walk-through: from a photograph to a tried model, on sets of photographs that are not in this repository
-//! (`make walk SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
+//! A timed walk-through, from a photo to a tried model, on sets of photos that are not in this repository (`make walk
+//! SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
 //!
 //! The page's waiting times are measured. The user's times are added: for actions by the keystroke-level model (Card,
-//! Moran, Newell 1980), and 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
+//! Moran, Newell 1980), and for reading every new line on the page at 238 words a minute (Brysbaert 2019).
 //! `SDG_WALK_WORDS=1` prints these lines. A line in which only numbers or the full stop change is not counted again;
 //! text for screen readers is not counted.
 
@@ -15,9 +15,9 @@ use sdg_demonstration::{Annotation, ImageFacts};
 
 /// The limit of issue 19: from a photo to a tried model in under three minutes with model S.
 const MAX_SECONDS: f64 = 180.0;
-/// The limit of issue 47: under 140 seconds, of which 40 are actions and, on an idle computer, 7 are waiting.
+/// The limit of issue 47: less than 140 seconds, of which 40 are actions and, on an idle computer, 7 are waiting.
 const MAX_WORDS: usize = 370;
-/// Deciding on the next action, moving the pointer to it, pressing.
+/// Time to decide on the next action, to move the pointer to it, and to press.
 const ACTION_SECONDS: f64 = 1.35 + 1.1 + 0.2;
 const WORDS_PER_SECOND: f64 = 238.0 / 60.0;
 /// Relative margin of a person's box around the part.
@@ -64,7 +64,8 @@ impl StopWatch {
     }
 }
 
-/// The visible text of the page: without `.sr`, which is for screen readers, and only the chosen line of a closed list.
+/// The visible text of the page: without `.sr`, which is for screen readers, and with only the chosen line of a closed
+/// list.
 fn visible_text(page: &Page) -> String {
     let script = "const sheet = document.styleSheets[0]; sheet.insertRule('.sr { display: none !important }', 0);
         const text = document.body.innerText; sheet.deleteRule(0);
@@ -159,11 +160,11 @@ fn from_a_photograph_to_a_tried_model_in_three_minutes() {
     let sets = std::env::var("SDG_WALK").unwrap();
     let mut slowest = 0.0f64;
     for set in sets.split_whitespace() {
-        // A folder of parts that look the same when turned: FOLDER=2.
+        // A folder of parts that look the same when rotated: FOLDER=2.
         let (folder, symmetry) = set.split_once('=').unwrap_or((set, "1"));
         let seconds = walk(Path::new(folder), symmetry);
         slowest = slowest.max(seconds);
     }
-    // All sets are walked first, so that each is reported.
+    // All sets are walked through first, so that each one is reported.
     assert!((1.0..MAX_SECONDS).contains(&slowest), "{slowest:.0} s");
 }

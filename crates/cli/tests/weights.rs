@@ -1,4 +1,4 @@
-//! `sdg weights` as called by a user.
+//! `sdg weights`, called as a user would.
 
 use std::fs;
 use std::path::{Path, PathBuf};

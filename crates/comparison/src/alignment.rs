@@ -1,23 +1,23 @@
-//! The error of a pose, from the positions of the demonstration's features in the picture.
+//! The correction of a pose, from the positions of the demonstration's features in the picture.
 //!
-//! Every cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach.
-//! The search finds the shift, turn and size that maximise the mean cosine of the part's cells, minus a penalty for
+//! Each cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach.
+//! The search finds the shift, rotation and size that maximise the mean cosine of the part's cells, minus a penalty for
 //! movement. A cell on an edge does not determine the shift along the edge, since its cosines are equal there; other
 //! cells do.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
-/// Penalty of the mean cosine per squared cell of shift, and per squared radian of turn and squared ln of size. Of 0,
-/// 0.005, 0.02, 0.04 and 0.08 (the second twenty times as much), 192 poses of 24 generated parts with errors of up to a
-/// tenth of the part, 8° and 6 % had the smallest errors with 0.04: a median of 2.9 % of the part, and 8.0 % before the
-/// correction.
+/// Penalty of the mean cosine per squared cell of shift; the penalty per squared radian of rotation and per squared ln
+/// of size is twenty times this one. Of 0, 0.005, 0.02, 0.04 and 0.08, the value 0.04 gave the smallest errors for 192
+/// poses of 24 generated parts with errors of up to a tenth of the part, 8° and 6 %: a median of 2.9 % of the part, and
+/// 8.0 % before the correction.
 const SHIFT_PENALTY: f64 = 0.04;
 const TURN_PENALTY: f64 = 0.8;
-/// Steps of turn and of ln of size that correspond to a step of one cell.
+/// Steps of rotation (radians) and of ln of size that correspond to a step of one cell.
 const TURN_STEP: f64 = 0.1;
 const SIZE_STEP: f64 = 0.06;
-/// Minimum share of a cell inside the outline for the cell to be used.
+/// Minimum fraction of a cell inside the outline for the cell to be used.
 const MIN_INSIDE: f32 = 0.05;
 
 const SEARCH: CompassSearch =
@@ -28,7 +28,7 @@ const SEARCH: CompassSearch =
 pub(crate) struct CellCosines {
     /// `[(2 reach + 1)², M, M]`, shifts row by row.
     pub(crate) cosines: Vec<f32>,
-    /// Share of each cell inside the outline, `[M, M]`.
+    /// Fraction of each cell inside the outline, `[M, M]`.
     pub(crate) inside: Vec<f32>,
     pub(crate) reach: usize,
     /// M.
@@ -38,18 +38,18 @@ pub(crate) struct CellCosines {
 /// The positions of the part's features in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// Maps each position of the demonstration's map to its position in the picture's map, in cells from the centre:
-    /// for [`crate::Reference::corrected`].
+    /// Maps each position of the demonstration's map to its position in the picture's map, in cells from the centre.
+    /// Apply it with [`crate::Reference::corrected`].
     pub offset: PlanarSimilarity,
-    /// Their similarity there, in `[0, 1]`: the mean over the part.
+    /// Mean cosine of the part's cells at these positions, in `[0, 1]`.
     pub cosine: f64,
 }
 
-/// Shift in cells, turn in radians, ln of size.
+/// Shift in cells (x, y), rotation in radians, ln of size.
 type Offset = [f64; 4];
 
 impl CellCosines {
-    /// The error of the pose.
+    /// Finds the correction of the pose.
     pub(crate) fn alignment(&self) -> Alignment {
         let reach = self.reach as f64;
         let moved = |offset: &Offset, k: usize, step: f64| {
@@ -65,7 +65,7 @@ impl CellCosines {
         Alignment { offset, cosine: self.mean_cosine(&cells, &found) }
     }
 
-    /// Index, position from the centre and weight of each cell of the part; the weights sum to 1.
+    /// Index, position relative to the centre and weight of each cell of the part; the weights sum to 1.
     fn cells(&self) -> Vec<(usize, Vector2<f64>, f64)> {
         let middle = 0.5 * (self.map_px as f64 - 1.0);
         let of_part = || self.inside.iter().enumerate().filter(|(_, share)| **share >= MIN_INSIDE);
@@ -86,7 +86,7 @@ impl CellCosines {
     }
 
     /// The cosine of a cell with the picture's map at this offset, by Catmull-Rom splines between the shifts: with
-    /// linear interpolation the maximum would always lie at a whole cell.
+    /// linear interpolation, the maximum would always lie at a whole cell.
     fn cosine(&self, cell: usize, x: f64, y: f64) -> f64 {
         let (reach, side) = (self.reach as i32, 2 * self.reach + 1);
         let cells = self.map_px * self.map_px;
@@ -122,7 +122,8 @@ fn catmull_rom(t: f64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Cosines that decrease with the distance from the position given by an offset for each cell.
+    /// Cosines for a given offset: they decrease with the distance of each shift from the offset's position for the
+    /// cell.
     fn cosines(offset: &PlanarSimilarity, map_px: usize, reach: usize) -> Vec<f32> {
         let (middle, side) = (0.5 * (map_px as f64 - 1.0), 2 * reach + 1);
         let at = |shift: usize, cell: usize| {

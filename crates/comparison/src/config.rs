@@ -1,9 +1,9 @@
-//! The network's shape, as plain data that a model file can carry.
+//! The network's configuration, as plain data for model files.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A setting with which no network can be built.
+/// An invalid setting.
 #[derive(Debug, Error)]
 #[error("comparison network: {field} must be {expected}, found {found}")]
 pub struct ComparisonError {
@@ -12,29 +12,30 @@ pub struct ComparisonError {
     found: String,
 }
 
-/// The network. Every stage halves its map with its first convolution.
+/// The network. The first convolution of every stage halves the map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ComparisonConfig {
     /// S: side of a view, in pixels.
     pub input_px: u32,
-    /// Channels of the stages that process demonstration and picture separately.
+    /// Channels of each trunk stage. The trunk processes demonstration and picture separately, with the same weights.
     pub trunk_channels: Vec<usize>,
-    /// Convolutions of each of them, the halving one included.
+    /// Convolutions of each trunk stage, including the one that halves the map.
     pub trunk_convs: Vec<usize>,
-    /// Range in cells, along each axis, by which the demonstration's map is shifted over the picture's.
+    /// Maximum shift of the demonstration's map over the picture's, in cells along each axis.
     pub reach: usize,
     /// Channels of each stage that processes the differences.
     pub stage_channels: Vec<usize>,
-    /// Convolutions of each stage, the halving one included; as many as there are stages.
+    /// Convolutions of each stage in `stage_channels`, including the one that halves the map.
     pub stage_convs: Vec<usize>,
-    /// Groups of the group norms; divides every stage's channels.
+    /// Groups of the group norms; a divisor of every stage's channels.
     pub norm_groups: usize,
     /// Width of the hidden fully connected layer.
     pub hidden: usize,
 }
 
 impl ComparisonConfig {
-    /// 64 × 64 pixels, 0.6 million parameters; the trunk is the first stages of preset `edge`'s orientation CNN.
+    /// 64 × 64 pixels, 0.6 million parameters. The trunk equals the first stages of the orientation CNN of preset
+    /// `edge`.
     pub fn edge() -> Self {
         Self {
             input_px: 64,
@@ -48,17 +49,18 @@ impl ComparisonConfig {
         }
     }
 
-    /// Views of twice the resolution. Log-odds are learnt for one size; positions of features can be found at any.
+    /// The configuration for views of twice the resolution. Log-odds are learnt for one size; alignment works at any
+    /// size.
     pub fn finer(&self) -> Self {
         Self { input_px: 2 * self.input_px, ..self.clone() }
     }
 
-    /// Side of the trunk's map.
+    /// Side of the trunk's map, in cells.
     pub fn trunk_map_px(&self) -> usize {
         self.input_px as usize >> self.trunk_channels.len()
     }
 
-    /// Side of the last map.
+    /// Side of the last map, in cells.
     pub fn last_map_px(&self) -> usize {
         self.trunk_map_px() >> self.stage_channels.len()
     }

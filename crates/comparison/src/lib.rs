@@ -1,23 +1,24 @@
-//! The comparison network: does a place of a picture show the part of a demonstration at the model's pose?
+//! The comparison network: does a picture show the part of a demonstration at the model's pose?
 //!
 //! ```text
-//! demonstration, outline ─ upright, S×S ───────────────┐
-//!                                                      ├─ maps, cosines, differences ─ convolutions ─ log-odds
-//! picture, pose ─ turned upright by the pose, S×S ─────┘
+//! demonstration, outline ─ upright, S×S ────────────────┐
+//!                                                       ├─ maps, cosines, differences ─ convolutions ─ log-odds
+//! picture, pose ─ rotated upright by the pose, S×S ─────┘
 //! ```
 //!
-//! Both are cropped by the pose, so that the same place of the part is the same pixel of both, and only their
-//! similarity remains to be judged. That question is the same for every part, so that the network is not specific to
-//! any part: it is trained once, on generated parts and their look-alikes, and teaching only adds the demonstration.
+//! Both are cropped by the pose, so that the same point of the part is at the same pixel of both, and the network only
+//! judges their similarity. This question is the same for every part: the network is trained once, on generated parts
+//! and their look-alikes, and teaching only adds the demonstration.
 //!
-//! **Frame of a view.** A square about the middle of the outline's box, in the demonstration's direction, x right, y down.
+//! **Frame of a view.** A square about the centre of the outline's box, in the demonstration's direction, x right, y
+//! down.
 //!
-//! Elsewhere: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
+//! Not in this crate: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
 //!
 //! # Source
-//! Both as channels of one input: the 2-channel network of Zagoruyko and Komodakis, Learning to Compare Image Patches via
-//! Convolutional Neural Networks (2015). Log-odds of a pose, from a picture and a view of the object under it: Labbé and
-//! others, MegaPose (2022).
+//! Two images as channels of one input: the 2-channel network of Zagoruyko and Komodakis, Learning to Compare Image
+//! Patches via Convolutional Neural Networks (2015). Log-odds of a pose, from a picture and a view of the object in
+//! that pose: Labbé and others, MegaPose (2022).
 //!
 //! # Example
 //! ```

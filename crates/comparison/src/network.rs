@@ -1,4 +1,4 @@
-//! The network: views in, log-odds out.
+//! The network: from views to log-odds.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation};
@@ -11,35 +11,35 @@ use crate::view::{Batch, DIFFERENCES, View};
 
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
-/// Added to the square of a cell's length, so that a cell without features has a direction of zero.
+/// Added to the squared length of a cell's features, so that a cell without features has the direction zero.
 const SQUARE_EPSILON: f32 = 1e-4;
 
 /// The comparison network.
 #[derive(Module, Debug)]
 pub struct ComparisonNetwork {
-    /// From a square of the demonstration or of the picture to its map; the same for both.
+    /// Computes the map of a square of the demonstration or of the picture; the same weights for both.
     pub trunk: Vec<Stage>,
-    /// From the differences to the last map.
+    /// Computes the last map from the differences.
     pub stages: Vec<Stage>,
-    /// Fully connected layer, from the flattened last map.
+    /// Fully connected layer, from the flattened last map to the hidden units.
     pub hidden: Linear,
-    /// Fully connected layer, to the log-odds.
+    /// Fully connected layer, from the hidden units to the log-odds.
     pub output: Linear,
     #[module(skip)]
     config: ComparisonConfig,
 }
 
 impl ComparisonConfig {
-    /// Builds the network with parameters drawn from a seed. For training the device must carry autodiff.
+    /// Builds the network with random parameters from a seed. For training, the device must support autodiff.
     ///
     /// # Errors
-    /// A setting that is out of its range.
+    /// A setting is outside its range.
     pub fn init(&self, device: &Device, seed: u64) -> Result<ComparisonNetwork, ComparisonError> {
         self.check()?;
         Ok(ComparisonNetwork::init(self, &mut Initializer::new(device, seed)))
     }
 
-    /// Builds the network without initial values, for a caller that sets all parameters next.
+    /// Builds the network without initial values, for a caller that then sets all parameters.
     ///
     /// # Errors
     /// As for [`Self::init`].
@@ -58,7 +58,7 @@ impl ComparisonNetwork {
         let head = stages(compared, 3, &config.stage_channels, &config.stage_convs, groups, init);
         let flat = config.stage_channels.last().copied().unwrap_or(compared) * config.last_map_px().pow(2);
         let hidden = Linear::init(flat, config.hidden, Distribution::he_normal(flat), init);
-        // Small first outputs: the network is undecided.
+        // Small first outputs: log-odds near zero.
         let output = Linear::init(config.hidden, 1, Distribution::Normal { std: 0.01 }, init);
         Self { trunk, stages: head, hidden, output, config: config.clone() }
     }
@@ -82,7 +82,7 @@ impl ComparisonNetwork {
         self.log_odds(&maps)
     }
 
-    /// The log-odds of each view, and the error of its pose.
+    /// The log-odds of each view and the correction of its pose.
     ///
     /// # Panics
     /// With views of another network's references.
@@ -101,7 +101,7 @@ impl ComparisonNetwork {
         rows(read, views.len()).await.iter().map(|values| of_view(values)).collect()
     }
 
-    /// The error of the pose of each view. The views may be finer than those on which the log-odds are learnt
+    /// The correction of the pose of each view. The views may be finer than those on which the log-odds are learnt
     /// ([`ComparisonConfig::finer`]), since the features are computed in the same way at every position.
     ///
     /// # Panics
@@ -115,7 +115,7 @@ impl ComparisonNetwork {
         rows(maps.cells(), views.len()).await.iter().map(|values| self.cells(values, map_px).alignment()).collect()
     }
 
-    /// From the shares inside the outline and the cosines of one view.
+    /// Splits the fractions inside the outline and the cosines of one view.
     fn cells(&self, values: &[f32], map_px: usize) -> CellCosines {
         let (inside, cosines) = values.split_at(map_px * map_px);
         CellCosines { cosines: cosines.to_vec(), inside: inside.to_vec(), reach: self.config.reach, map_px }
@@ -149,7 +149,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// The error of the pose.
+    /// Finds the correction of the pose.
     pub fn alignment(&self) -> Alignment {
         self.cells.alignment()
     }
@@ -162,7 +162,7 @@ struct Maps {
     demonstration: Tensor<4>,
     /// `[N, C, M, M]`.
     picture: Tensor<4>,
-    /// `[N, DIFFERENCES, M, M]`, and the last of them.
+    /// `[N, DIFFERENCES, M, M]`; the last channel is the fraction of each cell inside the outline.
     differences: Tensor<4>,
     inside: Tensor<4>,
     /// `[N, (2 reach + 1)², M, M]`.
@@ -175,7 +175,7 @@ impl Maps {
         self.inside.dims()[3]
     }
 
-    /// The shares inside the outline and the cosines of each view, `[N, (1 + (2 reach + 1)²) M²]`.
+    /// The fractions inside the outline and the cosines of each view, `[N, (1 + (2 reach + 1)²) M²]`.
     fn cells(&self) -> Tensor<2> {
         Tensor::cat(vec![self.inside.clone().flatten(1, 3), self.cosines.clone().flatten(1, 3)], 1)
     }
@@ -183,12 +183,11 @@ impl Maps {
 
 /// The rows of a tensor, `[N, …]`.
 async fn rows(tensor: Tensor<2>, n: usize) -> Vec<Vec<f32>> {
-    let values: Vec<f32> =
-        tensor.into_data_async().await.expect("what the device computes can be read").iter().collect();
+    let values: Vec<f32> = tensor.into_data_async().await.expect("device results are readable").iter().collect();
     values.chunks_exact(values.len() / n).map(<[f32]>::to_vec).collect()
 }
 
-/// Stages that halve their maps each; the first convolution's kernel has a side of its own.
+/// Stages that each halve their map; `first_kernel` is the side of the first convolution's kernel.
 fn stages(
     mut in_channels: usize,
     first_kernel: usize,

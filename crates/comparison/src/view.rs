@@ -10,49 +10,49 @@ use sdg_orientation::{CropWindow, OUTSIDE, Pyramid};
 
 use crate::config::ComparisonConfig;
 
-/// Channels of one side: the colours, and the same normalised by their mean and deviation on the part.
+/// Channels of each image: the colours, and the colours normalised by their mean and deviation on the part.
 const COLOURS: usize = 6;
-/// Channels with the differences of the two sides on the part, for each colour, and the share of each cell inside the
-/// outline.
+/// Channels of differences: one per colour channel, between the two images on the part, and the fraction of each cell
+/// inside the outline.
 pub const DIFFERENCES: usize = COLOURS + 1;
 
-/// Side of a view over the longer side of the outline's box: room for a small error of the pose.
+/// Side of a view over the longer side of the outline's box: leaves a margin for small errors of the pose.
 const SIDE_PER_LENGTH: f64 = 1.25;
-/// Grey values per unit of the colours: about the deviation of photos.
+/// Grey values per unit of the colours: about the standard deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
-/// Added to the deviation on the part, so that noise on an even part stays small, in grey values.
+/// Added to the standard deviation on the part, in grey values, so that noise on a uniform part stays small.
 const DEVIATION_EPSILON: f32 = 12.0;
-/// Sample points of a pixel along each axis for the test whether they lie inside the outline.
+/// Sample points per pixel along each axis for the fraction inside the outline.
 const MASK_SAMPLES: u32 = 2;
 
-/// The compared images.
+/// The two images to compare.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
     /// The demonstration's colours, `[3, S, S]`; all views of one reference share them.
     demonstration: Arc<[f32]>,
-    /// The picture's, `[3, S, S]`.
+    /// The picture's colours, `[3, S, S]`.
     picture: Vec<f32>,
     /// Means over the cells of the trunk's map, `[DIFFERENCES, M, M]`.
     differences: Vec<f32>,
 }
 
 impl View {
-    /// The differences of the two sides on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and the
-    /// share of each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
+    /// The differences of the two images on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and
+    /// the fraction of each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
     pub fn differences(&self) -> &[f32] {
         &self.differences
     }
 }
 
-/// The demonstration's side of the comparison.
+/// The demonstration, prepared for comparisons.
 #[derive(Debug, Clone)]
 pub struct Reference {
     window: CropWindow,
-    /// Share of each pixel inside the outline, `[S, S]`.
+    /// Fraction of each pixel inside the outline, `[S, S]`.
     mask: Vec<f32>,
     /// `[COLOURS, S, S]`.
     own: Vec<f32>,
-    /// The first three of them.
+    /// The first three channels of `own`, which all views share.
     shared: Arc<[f32]>,
     input_px: u32,
     /// Side of a cell in pixels.
@@ -87,8 +87,7 @@ impl Reference {
         Self { window, mask, own, shared, input_px, cell_px }
     }
 
-    /// The demonstration, and the picture at a pose, which maps pixels of the demonstration's image to pixels of the
-    /// picture.
+    /// The view of the picture at a pose, which maps pixels of the demonstration's image to pixels of the picture.
     pub fn view(&self, picture: &Pyramid<'_>, image_from_demonstration: &PlanarSimilarity) -> View {
         let window = CropWindow {
             center: image_from_demonstration.apply(&self.window.center),
@@ -111,7 +110,7 @@ impl Reference {
         View { demonstration: self.shared.clone(), picture: seen, differences }
     }
 
-    /// A pose of this demonstration, corrected by the offset from its view's [`crate::Comparison`].
+    /// A pose of this demonstration, corrected by the offset of its view's [`crate::Alignment`].
     pub fn corrected(&self, pose: &PlanarSimilarity, offset: &PlanarSimilarity) -> PlanarSimilarity {
         let px_per_cell = self.window.side / f64::from(self.input_px) * self.cell_px as f64;
         let center = self.window.center;
@@ -119,7 +118,7 @@ impl Reference {
         pose.compose(&PlanarSimilarity::about(center, target, offset.angle, offset.scale))
     }
 
-    /// Appends the mean of each cell of a channel.
+    /// Appends the mean of a channel over each cell.
     fn append_means(&self, channel: &[f32], means: &mut Vec<f32>) {
         let (side, cell) = (self.input_px as usize, self.cell_px);
         let share = 1.0 / (cell * cell) as f32;
@@ -132,7 +131,7 @@ impl Reference {
     }
 }
 
-/// The colours of a crop in the network's form, `[COLOURS, S, S]`.
+/// The colours of a crop as input channels, `[COLOURS, S, S]`.
 fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
     let num_pixels = mask.len();
     let mut values = vec![0f32; COLOURS * num_pixels];
@@ -156,7 +155,7 @@ fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
     values
 }
 
-/// Views as the network's input.
+/// Views as input tensors of the network.
 pub(crate) struct Batch {
     /// Each demonstration once, `[D, 3, S, S]`.
     pub(crate) demonstrations: Tensor<4>,
@@ -185,7 +184,7 @@ impl Batch {
             .collect();
         let stacked = |channels: usize, parts: Vec<&[f32]>| {
             let len = parts.first().map_or(0, |part| part.len());
-            assert!(len > 0 && parts.iter().all(|part| part.len() == len), "views of one batch have one size");
+            assert!(len > 0 && parts.iter().all(|part| part.len() == len), "all views of a batch have the same size");
             let (n, side) = (parts.len(), (len / channels).isqrt());
             Tensor::<4>::from_data(TensorData::new::<f32, _>(parts.concat(), [n, channels, side, side]), device)
         };
@@ -221,7 +220,7 @@ mod tests {
         (image, outline)
     }
 
-    /// Views of 32 pixels, in cells of one.
+    /// A network for views of 32 pixels, whose cells are single pixels.
     fn config() -> ComparisonConfig {
         ComparisonConfig { input_px: 32, trunk_channels: Vec::new(), ..ComparisonConfig::edge() }
     }
@@ -240,7 +239,7 @@ mod tests {
         let reference = Reference::new(&image, &outline, &config());
         let turned = image::imageops::rotate90(&image);
         let turned = Pyramid::new(&turned);
-        // A quarter turn clockwise as seen: (x, y) goes to (height - y, x).
+        // A rotation by 90°, clockwise: (x, y) is mapped to (height - y, x).
         let pose = PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: 90.0, ty: 0.0 };
         let seen = reference.view(&turned, &pose);
         assert!(difference(&reference, &seen, 0) < 0.1 && difference(&reference, &seen, 3) < 0.1);

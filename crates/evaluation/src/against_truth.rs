@@ -1,4 +1,4 @@
-//! A detected grasp compared with the simulator's ground truth: its pose for the hand, and the errors of position and
+//! Compares a detected grasp with the simulator's ground truth: the pose for the hand, and the errors of position and
 //! angle.
 //!
 //! Used by rehearsals, trials and evaluations.
@@ -9,17 +9,17 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// The hand's pose for a grasp in a camera's picture: the grasp is projected onto the surface at the marks, whose
-/// height is not visible in a photo.
+/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose height
+/// a photo does not show.
 ///
 /// # Errors
-/// The ray misses that height, or the part is wider than the hand opens.
+/// The ray does not meet that height, or the part is wider than the hand opens.
 pub fn grasp_pose(object: &ObjectSpec, camera: &PosedCamera, grasp: &PlanarGrasp) -> Result<GraspPose, GraspError> {
     let plane = GraspPlane { mark_height_m: object.seen_height_m, grasp_height_m: object.grasp_height_m };
     GraspPose::from_planar(camera, grasp, &plane, LARGEST_JAW_WIDTH_M)
 }
 
-/// Error of a grasp against the true one; turns hidden by the part's symmetry are not counted.
+/// Error of a grasp relative to the true one, modulo the part's symmetry.
 pub fn grasp_error(
     object: &ObjectSpec,
     base_from_object: &Isometry3<f64>,

@@ -1,5 +1,5 @@
-//! Test of a finished model on held-back samples, used neither for teaching nor for calibration, counted as by `sdg
-//! evaluate --pictures`.
+//! Tests a finished model on held-out samples, which are used neither for teaching nor for calibration. The counts are
+//! those of `sdg evaluate --pictures`.
 
 use std::ops::RangeInclusive;
 
@@ -16,20 +16,21 @@ use serde_json::{Value, json};
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
 use crate::statistics::{Share, wilson_interval};
 
-/// Index of the first held-back sample, far beyond those for validation and calibration.
+/// Index of the first held-out sample, far beyond the samples for validation and calibration.
 const FIRST: u64 = 1 << 40;
-/// Number of samples: three quarters contain the part. Chosen for time: a sample takes 0.15 s of a core.
+/// Number of samples, three quarters of which contain the part. Chosen for time: a sample takes 0.15 s on one core.
 const COUNT: u64 = 24;
-/// Maximum size: larger samples take longer and show no more, because the part has a few hundred pixels in any case.
+/// Maximum size of a sample, in pixels. Larger samples take longer without more information: the part has a few hundred
+/// pixels in any case.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
 /// Range of sample sizes for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 
-/// Held-back samples of a teaching.
+/// The held-out samples of a teaching.
 pub struct HeldBackSamples(Augmenter);
 
 impl HeldBackSamples {
-    /// Samples of photos and a seed, with the part's size in this range, and limited to a useful picture size.
+    /// Creates samples from photos and a seed, with the part's size in this range, and with a limited picture size.
     ///
     /// # Errors
     /// No samples can be made from the photos.
@@ -45,22 +46,23 @@ impl HeldBackSamples {
         Ok(Self(Augmenter::new(demonstrations, config, seed)?))
     }
 
-    /// The sample with this number.
+    /// The sample with this index.
     pub fn sample(&self, number: u64) -> Sample {
         self.0.held_out(FIRST + number)
     }
 }
 
-/// The objects of a sample as labels.
+/// The labels of the objects in a sample.
 pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
-    // A part whose grasp is cut off by the border is optional.
+    // A part whose grasp is outside the picture is optional.
     let annotations = sample.objects.iter().map(|object| object.annotation(label, &sample.image));
     annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
 }
 
-/// The photos with unmarked parts, as detected by the model, removed, and the number of these parts.
+/// Removes unmarked parts from the photos, as detected by the model; also returns the number of removed parts.
 ///
-/// Such a photo is the samples' background, and parts in it would count as wrong. Marked parts were removed before.
+/// The photos are the background of the samples, so unmarked parts in them would count as wrong detections. Marked
+/// parts are already removed.
 fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
     let mut num_others = 0;
     let mut alone = Vec::with_capacity(demonstrations.len());
@@ -78,25 +80,25 @@ fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Resul
     Ok((alone, num_others))
 }
 
-/// Results of a model on its held-back samples.
+/// Results of a model on its held-out samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldBackFigures {
     samples: u64,
-    /// In pixels of the samples, as in an evaluation of them.
+    /// Totals; distances are in pixels of the samples.
     totals: Totals,
     /// Pixels of the photo per pixel of a sample.
     photo_px: f64,
-    /// Number of unmarked parts detected in the photos; they were removed from the samples.
+    /// Number of unmarked parts that were detected in the photos and removed from the samples.
     others_in_photo: usize,
 }
 
 impl HeldBackFigures {
-    /// Tests a model, as read from its file, on samples of the photos that it was taught from.
+    /// Tests a model, as read from its file, on samples of the photos from which it was taught.
     ///
     /// # Errors
     /// Samples cannot be made, or detection fails.
     pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
-        // The samples show the part anywhere.
+        // The part may be anywhere in a sample.
         let model = &model.clone().with_region(None)?;
         let facts = model.facts();
         let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
@@ -112,7 +114,7 @@ impl HeldBackFigures {
                 Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }
             };
             let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
-            // Demonstrations of a model that knows lengths are plan views with a uniform pixel size.
+            // The demonstrations of a model that knows lengths are plan views, whose pixel size is uniform.
             let metres_per_pixel = facts.lengths.map(|lengths| photo_px / lengths.pixels_per_m);
             let truth = |instance: &Instance| {
                 let mut truth = Truth::new(instance, &detector);
@@ -136,47 +138,47 @@ impl HeldBackFigures {
         Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
     }
 
-    /// Why the model is unusable, in words: it finds fewer than half of the parts, or accepts something in more than
+    /// The reason why the model is unusable: it finds fewer than half of the parts, or accepts a detection in more than
     /// half of the samples without the part. `None` if it is usable.
     pub fn failure(&self) -> Option<String> {
         let Totals { found, false_alarms, .. } = &self.totals;
         let reason = if 2 * found.count < found.of {
             format!("it finds {} of {} parts", found.count, found.of)
         } else if 2 * false_alarms.count > false_alarms.of {
-            format!("it accepts something in {} of {} without the part", false_alarms.count, false_alarms.of)
+            format!("it accepts a detection in {} of {} without the part", false_alarms.count, false_alarms.of)
         } else {
             return None;
         };
-        Some(format!("the model fails its own held-back samples: {reason}; are the marks where the part is?"))
+        Some(format!("the model fails on its own held-out samples: {reason}; check that the marks are on the part"))
     }
 
-    /// Share of detected parts.
+    /// Fraction of the parts that were found.
     pub fn found(&self) -> Share {
         self.totals.found
     }
 
-    /// Number of detections beside the part, in samples with the part.
+    /// Number of wrong detections in samples with the part.
     pub fn wrong(&self) -> usize {
         self.totals.wrong
     }
 
-    /// Samples without the part in which something was accepted.
+    /// Fraction of the samples without the part in which a detection was accepted.
     pub fn false_alarms(&self) -> Share {
         self.totals.false_alarms
     }
 
-    /// Median errors of detected parts: in pixels of the photo, and in degrees.
+    /// Median errors of found parts: distance in pixels of the photo, and angle in degrees.
     pub fn median_errors(&self) -> Option<[f64; 2]> {
         self.totals.errors.map(|errors| [self.photo_px * errors.median_px, errors.median_deg])
     }
 
-    /// The first of them with its unit: millimetres if the model knows lengths.
+    /// The median distance with its unit: millimetres if the model knows lengths.
     pub fn median_distance(&self) -> Option<(f64, &'static str)> {
         let millimetres = self.totals.errors?.median_mm.map(|mm| (mm, "mm"));
         millimetres.or(self.median_errors().map(|[px, _]| (px, "px")))
     }
 
-    /// Number of unmarked parts detected in the photos; they were removed from the samples.
+    /// Number of unmarked parts that were detected in the photos and removed from the samples.
     pub fn others_in_photo(&self) -> usize {
         self.others_in_photo
     }
@@ -194,7 +196,8 @@ impl HeldBackFigures {
         let others = (others > 0)
             .then(|| format!("; {others} further instances found in the photo were removed from the samples"));
         format!(
-            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
+            "on {} held-out samples, it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without \
+             the part ({}){}{}",
             self.samples,
             interval(found),
             self.wrong(),
@@ -204,7 +207,7 @@ impl HeldBackFigures {
         )
     }
 
-    /// As JSON: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    /// The results as JSON: the fields of `sdg evaluate --pictures --json`, and the intervals.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

@@ -1,18 +1,18 @@
-//! Evaluation of models: on labelled pictures, in the simulator, on held-back samples; results as tables, pages and
+//! Evaluation of models: on labelled pictures, in the simulator, and on held-out samples; results as tables, pages and
 //! JSON.
 //!
 //! ```text
 //! LabelledFolder ─ Tested ─ judge ─ Totals                 the user's own pictures            labelled_pictures
-//! TaughtFile ─ HeldBackFigures                             samples that nothing was taught on  held_back
-//! SplitSet ─ ReadySet ─ Measured                           sets to tune on, sets to report     split
-//! DemonstrationFolder ─ CrossCheck ─ Findings              many parts against each other       many_parts
+//! TaughtFile ─ HeldBackFigures                             samples not used in teaching       held_back
+//! SplitSet ─ ReadySet ─ Measured                           sets to tune on, sets to report    split
+//! DemonstrationFolder ─ CrossCheck ─ Findings              many parts, for look-alikes        many_parts
 //! feature simulation:
-//! Rehearsal ─ attempts of a simulated arm, with the finder that a real arm has                 rehearsal
+//! Rehearsal ─ attempts of a simulated arm, with the finder of a real one                       rehearsal
 //! Evaluation, AxesEvaluation, CamerasEvaluation ─ units ─ Store ─ Summary ─ tables, page       simulated
 //! ```
 //!
-//! Deliberately absent: arguments, terminals and exit codes. Progress is reported to a [`Progress`]; errors that an
-//! option helps with are an [`EvaluationError`], whose caller knows the option.
+//! Not in this crate: arguments, terminals and exit codes. Progress is reported to a [`Progress`]. An error that an
+//! option corrects is an [`EvaluationError`], to which the caller adds the option.
 //!
 //! ```
 //! use sdg_evaluation::{Share, wilson_interval};

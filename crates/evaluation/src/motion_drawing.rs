@@ -1,4 +1,4 @@
-//! Motions of the arm as an animation and a still picture.
+//! Draws motions of the arm as an animation and a still picture.
 
 use std::path::{Path, PathBuf};
 
@@ -15,26 +15,26 @@ use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
 const DRY_RUN: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
 const PLAN: MotionDrawing = MotionDrawing { name: "plan", width_px: 480, fps: 10.0, max_frames: 100.0 };
 
-/// The style of a drawn motion, and the name of its files.
+/// The style of a drawing of motions, and the name of its files.
 #[derive(Debug, Clone, Copy)]
 struct MotionDrawing {
-    /// Name of the files, without extensions.
+    /// Name of the files, without extension.
     name: &'static str,
-    /// Width of the pictures, px; the height is three quarters of it.
+    /// Width of the pictures, in pixels; the height is three quarters of it.
     width_px: u32,
     /// Frames per second.
     fps: f64,
-    /// Maximum number of pictures of a motion: a slow motion is shown faster.
+    /// Maximum number of pictures of a motion; a longer motion is shown faster.
     max_frames: f64,
 }
 
 impl MotionDrawing {
-    /// Time between two pictures of a motion, s.
+    /// Time between two pictures of a motion, in seconds.
     fn period_secs(&self, duration_secs: f64) -> f64 {
         (duration_secs / self.max_frames).max(1.0 / self.fps)
     }
 
-    /// Draws the arm at each joint position (rad) and opening (m) in a workcell, and returns the files written to the
+    /// Draws the arm at each joint position (rad) and opening (m) in a workcell. Returns the files written to the
     /// folder.
     ///
     /// # Errors
@@ -62,8 +62,8 @@ impl MotionDrawing {
     }
 }
 
-/// Draws the motion and the detected part as an animation and its last picture in a folder, and returns the files. The
-/// part stays on the table: it is drawn where the camera saw it.
+/// Draws the motion and the detected part as an animation, and its last picture, in a folder. Returns the files. The
+/// part stays at its detected position on the table.
 ///
 /// # Errors
 /// Files cannot be written, or rendering fails.
@@ -81,7 +81,7 @@ pub fn draw_dry_run(
     DRY_RUN.draw(folder, &config, &positions)
 }
 
-/// Draws consecutive motions among the obstacles of a workcell in a folder, and returns the files.
+/// Draws consecutive motions among the obstacles of a workcell in a folder. Returns the files.
 ///
 /// # Errors
 /// Files cannot be written, or rendering fails.
@@ -96,7 +96,7 @@ pub fn draw_motions(
     let period_secs = PLAN.period_secs(motions.iter().map(Trajectory::duration_secs).sum());
     let mut positions = Vec::new();
     for motion in motions {
-        // Both ends are drawn: consecutive motions meet at the plan's configurations.
+        // Both ends are drawn, because consecutive motions meet at the configurations of the plan.
         let count = (motion.duration_secs() / period_secs).ceil().max(1.0) as usize;
         for index in 0..=count {
             let (q, ..) = motion.sample(motion.duration_secs() * index as f64 / count as f64);

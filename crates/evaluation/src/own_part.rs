@@ -1,5 +1,4 @@
-//! The part that a model was taught from, as a body for the simulator: its outline in the photo, extruded to its
-//! height.
+//! The taught part as a body for the simulator: its outline in the photo, extruded to its height.
 
 use anyhow::{Context, Result};
 use sdg_geometry::RotationalSymmetry;
@@ -7,40 +6,40 @@ use sdg_grasp::{GraspModel, Lengths};
 use sdg_simulation::objects::{Extrusion, ObjectSpec};
 use thiserror::Error;
 
-/// Density of a part without a given mass, in kg/m³: between plastic and aluminium.
+/// Density of a part whose mass is not given, in kg/m³: between plastic and aluminium.
 const ASSUMED_DENSITY: f64 = 1500.0;
-/// Friction of a part without a given one: that of most shipped parts.
+/// Friction coefficient of a part for which none is given: that of most shipped parts.
 const ASSUMED_FRICTION: f64 = 0.6;
-/// Approximate resolution of the wrist camera on the table, pixels per metre; a finer photo would be compared with
-/// blurred pictures.
+/// Approximate resolution of the wrist camera on the table, in pixels per metre; a finer photo would be compared with
+/// coarser pictures.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
-/// Maximum assumed mass of a body in kilograms: the arm's load.
+/// Maximum assumed mass of a body, in kg: the arm's load.
 const MAX_ASSUMED_KG: f64 = 3.0;
 
-/// A part made from a model, and the model for the simulated camera.
+/// A part made from a model, with the model for the simulated camera.
 pub struct OwnPart {
     pub object: ObjectSpec,
     pub model: GraspModel,
-    /// Its given and assumed properties, for display.
+    /// Given and assumed properties of the part, for display.
     pub facts: String,
 }
 
-/// Properties of a part that the photo does not show; `None` if not given.
+/// Properties of a part that the photo does not show; `None` for the ones that are not given.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OwnPartSizes {
-    /// Height over the table.
+    /// Height above the table, in mm.
     pub height_mm: Option<f64>,
-    /// Length of the longer side of its box.
+    /// Length of the longer side of the part's box, in mm.
     pub length_mm: Option<f64>,
     pub mass_g: Option<f64>,
-    /// Coefficient of friction of its surface.
+    /// Coefficient of friction of the part's surface.
     pub friction: Option<f64>,
 }
 
 /// An assumption about a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Assumption {
-    /// The mass, with a density between plastic and aluminium.
+    /// The mass: the density is between plastic and aluminium.
     Mass,
     Friction,
     UprightWalls,
@@ -50,27 +49,27 @@ pub enum Assumption {
     BoxAsOutline,
 }
 
-/// Sizes that are inconsistent with the model.
+/// Given sizes that are inconsistent with the model.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum OwnPartError {
-    /// Neither given nor known.
+    /// The length is neither given nor known.
     #[error("expected the longer side of the part's box, which a model taught without a camera does not know")]
     NeedsLength,
-    /// Neither given nor known.
-    #[error("expected the part's height over the table, which a model taught without a camera does not know")]
+    /// The height is neither given nor known.
+    #[error("expected the part's height above the table, which a model taught without a camera does not know")]
     NeedsHeight,
-    /// Both given and known.
-    #[error("expected a model taught without a camera, found one that knows that its part is {known_mm:.1} mm long")]
+    /// The length is both given and known.
+    #[error("expected a model taught without a camera, found one whose part is {known_mm:.1} mm long")]
     LengthIsKnown { known_mm: f64 },
 }
 
 impl OwnPart {
-    /// Makes the part; `model_file` names the model in errors, and `in_words` describes the assumptions.
+    /// Makes the part. `model_file` names the model in errors, and `in_words` describes the assumptions.
     ///
     /// # Errors
-    /// [`OwnPartError`]; the simulated hand cannot grasp the part.
+    /// [`OwnPartError`]; or the simulated hand cannot grasp the part.
     pub fn make(
         model: GraspModel,
         model_file: &str,

@@ -1,11 +1,11 @@
 //! Progress of an evaluation.
 
-/// Receives progress from all workers; implemented by the caller, who shows it.
+/// Receives progress from all workers; the caller implements it and displays the progress.
 pub trait Progress: Sync {
     /// Announces further units.
     fn expect(&self, units: usize);
 
-    /// A unit has ended; `what` describes its result.
+    /// Reports that a unit has ended; `what` describes its result.
     fn unit_done(&self, what: &str);
 
     /// Prints a separate line.

@@ -1,8 +1,8 @@
 //! Grasp attempts with a model in the simulated workcell, and their results.
 //!
-//! The arm gets its grasps in the same way as a real one ([`ModelFinder`]): from the picture, the camera's pose on the
-//! flange, and the model's lengths. From the simulator it gets only what a cell's owner knows: the intrinsics, the
-//! hand-eye calibration, the table's height, and the heights of marks and grasp.
+//! The arm gets its grasps in the same way as a real arm ([`ModelFinder`]): from the picture, the camera's pose on the
+//! flange, and the model's lengths. From the simulator it gets only facts that the owner of a cell knows: the
+//! intrinsics, the hand-eye calibration, the table's height, and the heights of marks and grasp.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -35,15 +35,16 @@ pub struct Rehearsal<'a> {
     /// The part on the table.
     pub object: &'a ObjectSpec,
     pub attempts: u32,
-    /// Seed of part poses, robot starts, lights, table and distractors.
+    /// Seed of the part's poses, the robot's starts, lights, table and distractors.
     pub seed: u64,
     /// Whether detections are checked against the demonstration.
     pub verification: Verification,
     /// Errors of the robot's settings and of the workcell.
     pub errors: RehearsalErrors,
-    /// The wrist camera, if it is not the paper's.
+    /// The wrist camera; `None` for the paper's.
     pub camera: Option<PinholeCamera>,
-    /// Where parts are put down: the attempts use its cells in turn. The table is otherwise empty except for the part.
+    /// The place where parts are put down; the attempts use its cells one after another. Apart from the part, the table
+    /// is then empty.
     pub place: Option<RehearsedPlace>,
 }
 
@@ -52,17 +53,17 @@ pub struct Rehearsal<'a> {
 pub struct RehearsedPlace {
     /// The place.
     pub place: Place,
-    /// A single cell, if not all of them are used in turn.
+    /// A single cell to use; `None` uses all cells one after another.
     pub cell: Option<u32>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
 }
 
 impl RehearsedPlace {
-    /// A place of a workcell, with a cell if the name contains one.
+    /// A place of a workcell; `text` may name one of its cells.
     ///
     /// # Errors
-    /// Unknown place or cell.
+    /// The place or the cell is unknown.
     pub fn named(text: &str, workcell: WorkcellFile) -> sdg_robot::Result<Self> {
         let (name, cell) = text.split_once(':').map_or((text, None), |(name, cell)| (name, Some(cell)));
         let place = workcell.places.iter().find(|place| place.name == name).cloned();
@@ -77,29 +78,29 @@ impl RehearsedPlace {
     }
 }
 
-/// Errors of a rehearsal; none by default.
+/// Errors that are applied in a rehearsal; none by default.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RehearsalErrors {
     /// Error of the marks' height in the robot's settings, in metres: added in attempts with odd numbers, subtracted in
     /// the others.
     pub mark_height_m: f64,
-    /// Errors in the workcell, by the attempt's seed.
+    /// Errors of the workcell, as a function of the attempt's seed.
     pub of_workcell: Option<fn(u64) -> AttemptErrors>,
 }
 
 /// Results of a rehearsal.
 pub struct Rehearsed {
-    /// One result per attempt, in order.
+    /// The result of each attempt, in order.
     pub attempts: Vec<AttemptSummary>,
-    /// External pictures of the first successful attempt, or of the last one recorded.
+    /// External pictures of the first successful attempt, or of the last recorded one.
     pub film: Vec<RgbImage>,
-    /// The wrist camera's last picture before each attempt's approach, with the detection drawn.
+    /// The wrist camera's last picture before the approach of each attempt, with the detection drawn.
     pub views: Vec<RgbImage>,
-    /// Whether parts were to be put down.
+    /// Whether parts were put down.
     pub is_placing: bool,
 }
 
-/// A failed attempt, as listed by `--json` (docs/command-line.md).
+/// A failed attempt, as in the list of `--json` (docs/command-line.md).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     attempt: usize,
@@ -108,12 +109,12 @@ pub struct Failure {
 }
 
 impl Rehearsed {
-    /// Number of attempts that held the part.
+    /// Number of attempts in which the part was held.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
     }
 
-    /// The other attempts, and why they failed.
+    /// The failed attempts, and the reasons.
     pub fn failures(&self) -> Vec<Failure> {
         self.attempts
             .iter()
@@ -129,19 +130,19 @@ impl Rehearsed {
     }
 }
 
-/// Number of looks in an attempt, until the part was found or no further pose for a look remained.
+/// Number of pictures that were searched in an attempt, until the part was found or no further camera pose remained.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Looks {
-    /// From the look-out pose and beside it.
+    /// Pictures from the look-out pose and near it.
     pub from_afar: usize,
-    /// From above the detected part.
+    /// Pictures from above the detected part.
     pub from_above: usize,
 }
 
 /// An attempt with its pictures.
 pub struct RehearsedAttempt {
     pub attempt: AttemptSummary,
-    /// Number of looks.
+    /// Number of searched pictures.
     pub looks: Looks,
     /// External pictures, if requested.
     pub frames: Vec<RgbImage>,
@@ -150,7 +151,7 @@ pub struct RehearsedAttempt {
 }
 
 impl Rehearsal<'_> {
-    /// Runs the attempts in order; `observe` is called after each and may end the rehearsal.
+    /// Runs the attempts in order. `observe` is called after each one and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed =
             Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
@@ -175,7 +176,7 @@ impl Rehearsal<'_> {
     /// Rejects a place whose cells have too little room for the part or for the opening fingers.
     ///
     /// # Errors
-    /// The first such cell, with a sufficient pitch.
+    /// A cell is too small; the error names the first one and a sufficient pitch.
     pub fn check_room(&self) -> Result<()> {
         let part = part_shape(self.object)?;
         for number in 1..=self.attempts as usize {
@@ -186,9 +187,9 @@ impl Rehearsal<'_> {
         Ok(())
     }
 
-    /// Runs one attempt: scene and start depend only on the rehearsal and the number.
+    /// Runs one attempt. Its scene and start depend only on the rehearsal and the number.
     ///
-    /// An unreachable grasp (wider than the hand, off the table) is a failed attempt.
+    /// A grasp that cannot be executed (wider than the hand, off the table) is a failed attempt.
     ///
     /// # Errors
     /// Errors of the simulation.
@@ -235,7 +236,7 @@ impl Rehearsal<'_> {
         Ok(RehearsedAttempt { attempt, looks, frames, view })
     }
 
-    /// Where and how an attempt puts the part down.
+    /// The place and the settings with which an attempt puts the part down.
     fn placing(&self, number: usize) -> Result<Option<(PlaceGoal, PlacingConfig)>> {
         let Some(RehearsedPlace { place, cell, .. }) = &self.place else { return Ok(None) };
         let in_turn = (number as u32 - 1) % place.num_cells() + 1;
@@ -258,8 +259,8 @@ impl Rehearsal<'_> {
         Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
     }
 
-    /// The lengths of a model that was taught from a shipped demonstration in its pixels: those of the camera that took
-    /// it, which looked straight down, so the pixel size is uniform in the marks' plane.
+    /// The lengths of a model that was taught from a shipped demonstration in its own pixels: those of the camera that
+    /// took it. That camera looked straight down, so the pixel size is uniform in the marks' plane.
     fn lengths_of_demonstration(&self) -> Result<Lengths> {
         let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
         let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;
@@ -275,7 +276,7 @@ impl Rehearsal<'_> {
             GraspOutcome::Held => (GraspStep::Hold, String::new()),
             GraspOutcome::Failed { step, why } => (*step, why.clone()),
         };
-        // The last look determines the hand's pose.
+        // The last detection determines the hand's pose.
         let last_target = report.targets.iter().rev().flatten().next();
         let detection_error = report
             .base_from_object
@@ -291,7 +292,7 @@ impl Rehearsal<'_> {
         }
     }
 
-    /// The known facts of an attempt before it begins: the part's pose.
+    /// The facts of an attempt that are known before it begins: the part's pose.
     fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> AttemptSummary {
         let grasp = base_from_object.map(|base_from_object| self.object.grasp_in_base(&base_from_object));
         let (object_mm, object_angle_deg) = match grasp {

@@ -1,4 +1,4 @@
-//! The page of a run: teaching, training progress, detections and grasps.
+//! The page of a run: teaching, progress of training, detections and grasps.
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
@@ -26,11 +26,11 @@ pub struct RunPage<'a> {
     pub command: &'a str,
 }
 
-/// Additional inputs of a run that also taught.
+/// Additional inputs for a run that also taught the model.
 pub struct TaughtHere<'a> {
     /// The photo and its marks.
     pub demonstration: &'a Demonstration,
-    /// Losses and validations of the detector; `None` for a model without one.
+    /// Losses and validations of the detector; `None` for a model without a network.
     pub history: Option<&'a History>,
     /// Pictures with and without the part.
     pub trials: &'a [Trial],
@@ -44,7 +44,7 @@ const FILM_SPEED: f64 = 2.0;
 pub fn rehearsal(page: &RunPage) -> Result<Report> {
     let title = format!("{}: {} grasp attempts", page.object.title, page.rehearsed.attempts.len());
     let report = Report::new(title).kicker("Rehearsal in simulation").lead(format!(
-        "A grasp model taught from one photo looked for the {} on the table, {}.",
+        "A grasp model taught from one photo searched for the {} on the table, {}.",
         page.object.title.to_lowercase(),
         lifted(page)
     ));
@@ -58,8 +58,8 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
     let report = Report::new(format!("{}, taught from one photo", page.object.title))
         .kicker("Demonstration to grasp, in simulation")
         .lead(format!(
-            "One photo, one marked grasp, {:.0} seconds of teaching. The robot then looked for the part in poses it had not \
-             seen, {}.",
+            "One photo, one marked grasp, {:.0} seconds of teaching. The robot then searched for the part in unseen \
+             poses, {}.",
             facts.seconds,
             lifted(page)
         ))
@@ -89,8 +89,8 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
 fn lifted(page: &RunPage) -> String {
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
         (0, of) => format!("and lifted it in none of {of} attempts"),
-        (successes, of) if successes == of => format!("went to it and lifted it, {of} times"),
-        (successes, of) => format!("and went to it and lifted it in {successes} of {of} attempts"),
+        (successes, of) if successes == of => format!("and lifted it in {of} of {of} attempts"),
+        (successes, of) => format!("and lifted it in {successes} of {of} attempts"),
     }
 }
 
@@ -102,7 +102,7 @@ fn with_key_figures(report: Report, page: &RunPage) -> Report {
         KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), "grasped and held").tone(tone),
     );
     match median(attempts.iter().filter_map(|a| a.detection_error.map(|e| e.distance_mm))) {
-        Some(mm) => report.key_figure(KeyFigure::new(format!("{mm:.1}"), "mm", "median error where it closed")),
+        Some(mm) => report.key_figure(KeyFigure::new(format!("{mm:.1}"), "mm", "median error at closing")),
         None => report,
     }
 }
@@ -130,17 +130,19 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
     let figure = |trial: &&Trial| {
         let verdict = match (trial.present, trial.error) {
             (true, Some(e)) => format!("{:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg),
-            (true, None) => "the part is here and was not found".to_owned(),
-            (false, _) if trial.is_false_alarm() => "no part here: a false alarm".to_owned(),
-            (false, _) if trial.best_score > 0.0 => "no part here: the network's proposal was refused".to_owned(),
-            (false, _) => "no part here, nothing found".to_owned(),
+            (true, None) => "the part is in the picture and was not found".to_owned(),
+            (false, _) if trial.is_false_alarm() => "no part in the picture: a false alarm".to_owned(),
+            (false, _) if trial.best_score > 0.0 => "no part in the picture: the network's proposal was \
+                                                     refused"
+                .to_owned(),
+            (false, _) => "no part in the picture, nothing found".to_owned(),
         };
         Figure::photo(trial.drawn.clone()).caption(format!("{verdict}; score {:.2}", trial.best_score))
     };
     let shown = with_part.iter().take(6).chain(without.iter().take(3));
     Section::new("Detections")
         .lead(format!(
-            "On pictures of the simulator with other light, tables and objects. Right, that is within \
+            "On pictures of the simulator with other light, tables and objects. Correct, which means within \
              {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°: {right} of {}. False alarms without the part: {} of {}.",
             with_part.len(),
             without.iter().filter(|trial| trial.is_false_alarm()).count(),
@@ -156,12 +158,13 @@ fn attempts(page: &RunPage) -> Section {
     };
     Section::new("Attempts")
         .lead(
-            "Random poses of the part, of the robot at the start, of light, table and other objects. Held means: \
-             at least 10 cm above the table between both fingers, one second after lifting.",
+            "Random poses of the part, robot starts, light, tables and other objects. Held means: at least 10 cm \
+             above the table between both fingers, one second after lifting.",
         )
         .matrix(outcome_matrix(&steps, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
         .table(attempts_table(&steps, &page.rehearsed.attempts).caption(
-            "Where the part lay is in the robot's base frame. Errors are those of the second look, from above the part.",
+            "The part's position is in the robot's base frame. Errors are those of the second detection, from above \
+             the part.",
         ))
 }
 
@@ -188,7 +191,7 @@ fn this_run(page: &RunPage) -> Section {
             ("grasp model", format!("{}, preset {}", page.model.kind(), page.model.preset())),
             ("taught with", format!("seed {}, {} samples, {} steps", facts.seed, facts.samples, facts.steps)),
             (
-                "held-back samples",
+                "held-out samples",
                 facts.validation.map_or("none".to_owned(), |held_back| {
                     format!(
                         "median {:.1} px and {:.1}° after verification",

@@ -1,4 +1,4 @@
-//! The demonstrations in datasets/, compiled in, so that `sdg demo` runs from any folder.
+//! The demonstrations in datasets/, compiled into the program, so that `sdg demo` runs in any folder.
 
 use anyhow::{Context, Result, bail};
 use sdg_demonstration::Demonstration;
@@ -13,7 +13,7 @@ macro_rules! shipped {
     };
 }
 
-/// Name, photo, annotation.
+/// Name, photo and annotation of each demonstration.
 static SHIPPED: [(&str, &[u8], &[u8]); 12] = shipped![
     "pendulum",
     "fuel_line",

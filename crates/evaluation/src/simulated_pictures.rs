@@ -1,4 +1,4 @@
-//! The simulated workcell's camera, for the finder used with real arms.
+//! The camera of the simulated workcell, for the finder that real arms use.
 
 use sdg_cell::{Pictures, TakenPicture};
 use sdg_simulation::Workcell;

@@ -1,20 +1,20 @@
-//! Shares with their uncertainty.
+//! Fractions and their confidence intervals.
 
 use serde::Serialize;
 
 /// Two-sided 95 % quantile of the normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// `count` of `of`.
+/// A fraction: `count` of `of`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Share {
     pub count: usize,
-    /// The total.
+    /// The total number.
     pub of: usize,
 }
 
 impl Share {
-    /// Counts the items for which `holds` returns true.
+    /// Counts the items for which `holds` returns true, of all items.
     pub fn of<T>(items: impl IntoIterator<Item = T>, holds: impl Fn(&T) -> bool) -> Self {
         items.into_iter().fold(Self::default(), |share, item| Self {
             count: share.count + usize::from(holds(&item)),
@@ -22,7 +22,7 @@ impl Share {
         })
     }
 
-    /// In percent; `None` if the total is zero.
+    /// The fraction in percent; `None` if the total is zero.
     pub fn percent(self) -> Option<f64> {
         (self.of > 0).then(|| 100.0 * self.count as f64 / self.of as f64)
     }
@@ -48,11 +48,11 @@ impl std::fmt::Display for Share {
     }
 }
 
-/// 95 % confidence interval of a probability; all of `[0, 1]` if nothing was tried.
+/// 95 % confidence interval of a probability (Wilson); `[0, 1]` if the total is zero.
 ///
 /// # Source
 /// E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927, without continuity
-/// correction. Unlike the normal approximation it is meaningful for 80 of 80.
+/// correction. Unlike the normal approximation, it is meaningful for 80 of 80.
 pub fn wilson_interval(share: Share) -> [f64; 2] {
     if share.of == 0 {
         return [0.0, 1.0];
@@ -65,11 +65,12 @@ pub fn wilson_interval(share: Share) -> [f64; 2] {
     [(middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
-/// 95 % confidence interval of the difference of two independent probabilities, the first minus the second.
+/// 95 % confidence interval (Newcombe) of the difference between two independent probabilities, the first minus the
+/// second.
 ///
 /// # Source
 /// R. G. Newcombe, "Interval estimation for the difference between independent proportions", 1998, method 10, without
-/// continuity correction: Wilson's intervals of both shares, combined.
+/// continuity correction: a combination of Wilson's intervals of both fractions.
 pub fn newcombe_interval(first: Share, second: Share) -> [f64; 2] {
     if first.of == 0 || second.of == 0 {
         return [-1.0, 1.0];
@@ -84,7 +85,7 @@ pub fn newcombe_interval(first: Share, second: Share) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Precision of the references.
+    /// Precision of the reference values.
     const TOLERANCE: f64 = 5e-5;
 
     #[test]
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn newcombe_agrees_with_his_paper() {
-        // Table II of the paper, column of method 10.
+        // From table II of the paper, in the column of method 10.
         for ([a, m, b, n], low, high) in
             [([56, 70, 48, 80], 0.0524, 0.3339), ([9, 10, 3, 10], 0.1705, 0.8090), ([10, 10, 0, 20], 0.6791, 1.0)]
         {

@@ -1,5 +1,5 @@
-//! A model that was taught, serialised and read again: the file's model, whose weights are rounded, is tested and used,
-//! not the network in memory.
+//! A taught model that is serialised and read again. The model from the file, whose weights are rounded, is tested and
+//! used instead of the network in memory.
 
 use std::ops::ControlFlow;
 
@@ -9,18 +9,18 @@ use sdg_grasp::{GraspError, GraspModel, Taught, TeachOptions, TeachingEvent, tea
 
 use crate::held_back::HeldBackFigures;
 
-/// Result of a teaching.
+/// The result of a teaching.
 pub struct TaughtFile {
-    /// The model in memory, with its history.
+    /// The model in memory and its history.
     pub taught: Taught,
-    /// The model's file.
+    /// The contents of the model file.
     pub bytes: Vec<u8>,
-    /// The model read from these bytes.
+    /// The model that was read from these bytes.
     pub model: GraspModel,
 }
 
 impl TaughtFile {
-    /// Teaches; `observe` may end the teaching early.
+    /// Teaches a model; `observe` may end the teaching early.
     ///
     /// # Errors
     /// The errors of [`teach`].
@@ -35,7 +35,7 @@ impl TaughtFile {
         Ok(Self { taught, bytes, model })
     }
 
-    /// Tests it on held-back samples of its photos.
+    /// Tests the model on held-out samples of its photos.
     ///
     /// # Errors
     /// Samples cannot be made, or detection fails.

@@ -4,21 +4,22 @@ use sdg_demonstration::Demonstration;
 use sdg_grasp::{Ending, GraspModel, Taught};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 
-/// A warning if the jaws would have to open farther than the hand can: then no detection can be grasped.
+/// A warning if the jaws would have to open farther than the hand can, so that no detection could be grasped.
 pub fn too_wide(model: &GraspModel) -> Option<String> {
     let pixels_per_m = model.facts().lengths?.pixels_per_m;
     let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
     (widest > HAND_OPENING_MAX_M).then(|| {
         format!(
-            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
+            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, \
+             or rotate it",
             1e3 * widest,
             1e3 * HAND_OPENING_MAX_M
         )
     })
 }
 
-/// Warnings about jaws that open as wide as the box, because there is no outline: more than the part needs in an
-/// oblique direction.
+/// Warnings about jaws that open as wide as the box because there is no outline. In an oblique direction, the part
+/// needs less.
 pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
     let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
         let annotation = &demonstration.annotation;
@@ -33,7 +34,7 @@ pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration])
     told.collect()
 }
 
-/// How the network's training ended; empty for a model without a network.
+/// How the training of the network ended; empty for a model without a network.
 pub fn training(taught: &Taught) -> String {
     let facts = taught.model.facts();
     let Some(history) = &taught.history else { return String::new() };
@@ -44,7 +45,7 @@ pub fn training(taught: &Taught) -> String {
         Ending::Interrupted => ", interrupted",
     };
     let orientation = facts.orientation.map_or(String::new(), |cnn| {
-        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
+        format!("; angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
     });
     format!(" ({} steps{ending}{orientation})", facts.steps)
 }

@@ -17,30 +17,30 @@ use crate::footer::FOOTER;
 use crate::held_back::HeldBackFigures;
 use crate::machine::machine;
 
-/// Number of augmented samples shown.
+/// Number of augmented samples on the page.
 const SHEET: u64 = 24;
-/// Number of samples on which the finished model is shown.
+/// Number of samples in which the detections of the finished model are shown.
 const TRIED: u64 = 6;
-/// Index of the first of them, far beyond the samples of any training.
+/// Index of the first of these samples, far beyond the samples of any training.
 const FIRST_TRIED: u64 = 1 << 40;
 
 /// The page of `sdg teach`.
 pub struct TeachingPage<'a> {
-    /// The model, and how its network was trained.
+    /// The model and the history of its training.
     pub taught: &'a Taught,
-    /// Results of the finished model on held-back samples.
+    /// Results of the finished model on held-out samples.
     pub figures: &'a HeldBackFigures,
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
     pub seed: u64,
-    /// The user's waiting time: from the start of the program to the finished model and its figures.
+    /// The user's waiting time, in seconds: from the start of the program to the tested model.
     pub seconds: f64,
     /// The command that makes the same model again.
     pub command: &'a str,
 }
 
 impl TeachingPage<'_> {
-    /// Photo and marks, samples, curves, and detections in held-back samples.
+    /// The page: photos and marks, samples, curves, and detections in held-out samples.
     ///
     /// # Errors
     /// Samples cannot be made, or detection fails.
@@ -54,14 +54,14 @@ impl TeachingPage<'_> {
         let mut report = Report::new(format!("{name}, taught from {photos}"))
             .kicker("Teaching")
             .lead(format!(
-                "Model {} was shown {photos} with the grasp marked. The page shows the training data, and how well the model then \
-                 finds the part in samples that it had not seen.",
+                "Model {} was taught from {photos} with marked grasps. The page shows the training data, and the \
+                 model's results on unseen samples.",
                 model.kind()
             ))
             .key_figure(KeyFigure::new(
                 format!("{:.1}", self.seconds),
                 "s",
-                format!("to teach from {photos} and to try the model"),
+                format!("to teach from {photos} and to test the model"),
             ));
         let (found, false_alarms) = (self.figures.found(), self.figures.false_alarms());
         let tone = match found.percent() {
@@ -72,10 +72,10 @@ impl TeachingPage<'_> {
         let bad_if = |is_bad: bool| if is_bad { Tone::Bad } else { Tone::Good };
         report = report
             .key_figure(
-                KeyFigure::new(found.count.to_string(), format!("of {}", found.of), "held-back parts found").tone(tone),
+                KeyFigure::new(found.count.to_string(), format!("of {}", found.of), "held-out parts found").tone(tone),
             )
             .key_figure(
-                KeyFigure::new(self.figures.wrong().to_string(), "", "found where they are not")
+                KeyFigure::new(self.figures.wrong().to_string(), "", "wrong detections")
                     .tone(bad_if(self.figures.wrong() > 0)),
             )
             .key_figure(
@@ -88,8 +88,8 @@ impl TeachingPage<'_> {
             );
         if let Some(((off, unit), [_, deg])) = self.figures.median_distance().zip(self.figures.median_errors()) {
             report = report
-                .key_figure(KeyFigure::new(format!("{off:.1}"), unit, "median error of place"))
-                .key_figure(KeyFigure::new(format!("{deg:.1}"), "°", "median error of turn"));
+                .key_figure(KeyFigure::new(format!("{off:.1}"), unit, "median position error"))
+                .key_figure(KeyFigure::new(format!("{deg:.1}"), "°", "median angle error"));
         }
         let mut report = report.section(demonstration(model, self.demonstrations, self.seed)?);
         if let Some(history) = &self.taught.history {
@@ -99,21 +99,24 @@ impl TeachingPage<'_> {
     }
 
     fn tried(&self) -> Result<Section> {
-        // The samples show the part anywhere.
+        // The part may be anywhere in a sample.
         let model = self.taught.model.clone().with_region(None)?;
-        // Frames of the photo's size: the part's size is then in the searched range.
+        // Samples have the photo's size, so that the part's size is in the searched range.
         let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
         let mut figures = Vec::new();
         for i in 0..TRIED {
             let sample = augmenter.sample(FIRST_TRIED + i);
             let detections = model.detect(&sample.image, Verification::ByShape)?;
             let best = detections.iter().map(|detection| detection.score).fold(0.0, f64::max);
-            let there = if sample.objects.is_empty() { "no part here" } else { "the part is here" };
+            let there = if sample.objects.is_empty() { "without the part" } else { "with the part" };
             let figure = Figure::photo(drawing::with_detections(&sample.image, &detections));
             figures.push(figure.caption(format!("{there}; score {best:.2}")));
         }
         Ok(Section::new("Tried")
-            .lead("Samples that it was not taught on, with the finished model's scores; at least 0.5 is accepted.")
+            .lead(
+                "Samples that the model was not taught from, with its scores; detections with at least 0.5 are \
+                   accepted.",
+            )
             .gallery(GallerySize::Medium, figures))
     }
 
@@ -134,11 +137,11 @@ impl TeachingPage<'_> {
     }
 }
 
-/// The original and the marked photos, and samples made from them.
+/// The photos, the marked photos, and samples made from them.
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
     let as_seen = match model.facts().lengths {
-        None => "As the camera saw it.",
-        Some(_) => "The camera's picture in the plan view: turned so that x of the camera's frame points to the right.",
+        None => "As taken by the camera.",
+        Some(_) => "The picture in the plan view: x of the camera's frame points to the right.",
     };
     let mut pictures = Vec::new();
     for (at, Demonstration { image, annotation }) in demonstrations.iter().enumerate() {
@@ -153,21 +156,21 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
         );
         pictures.push(Figure::photo(image.clone()).caption(as_seen));
         pictures.push(Figure::photo(marked).caption(
-            "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws that follow (orange).",
+            "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws computed from them (orange).",
         ));
     }
     Ok(Section::new("Demonstration")
-        .lead("All that a person gave: a photo, a box, an outline, and a line along which to grasp.")
+        .lead("The complete human input: a photo, a box, an outline, and a line along which to grasp.")
         .gallery(GallerySize::Large, pictures)
         .captioned_gallery(
             GallerySize::Small,
             sheet(demonstrations, seed)?.into_iter().map(Figure::photo).collect(),
             if model.kind().has_network() {
-                "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
-                 things in the way. Scenes without a box lack the part, so that the model learns to reject."
+                "Samples from which the network was trained, all made from that photo: other backgrounds, light, \
+                 blur, noise, objects in front. Scenes without a box lack the part, so that the model learns to reject."
             } else {
-                "Samples that a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
-                 things in the way. Model S has no network; it searches for the photo's part itself."
+                "Samples from which a network would be trained, all made from that photo: other backgrounds, light, \
+                 blur, noise, objects in front. Model S has no network; it searches directly for the part in the photo."
             },
         ))
 }
@@ -176,7 +179,7 @@ fn jaw_width_px(model: &GraspModel, at: usize) -> f64 {
     model.demonstrations().get(at).map_or(0.0, |TaughtDemonstration { marks, .. }| marks.width_px)
 }
 
-/// The first training samples with their marks.
+/// The first training samples and their marks.
 fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
     let config = AugmentationConfig::default().with_output_size(320, 240);
     let augmenter = Augmenter::new(demonstrations, config, seed)?;
@@ -195,7 +198,7 @@ fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
         .collect())
 }
 
-/// Losses and validation by step.
+/// The losses and the validation by step.
 pub fn teaching(history: &History) -> Section {
     let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
         history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
@@ -209,14 +212,14 @@ pub fn teaching(history: &History) -> Section {
         history.validations.iter().map(|record| (record.steps_done as f64, pick(record))).collect()
     };
     let kept = history.best.steps_done as f64;
-    let place = Chart::new("Held-back samples: place", Axis::new("step"), Axis::new("error").unit("px").from_zero())
+    let place = Chart::new("Held-out samples: position", Axis::new("step"), Axis::new("error").unit("px").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_px)).with_markers())
         .moment(kept, "kept")
         .caption("The network alone, in pixels of the photo; before the check against the demonstration.");
-    let angle = Chart::new("Held-back samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
+    let angle = Chart::new("Held-out samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
         .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
         .moment(kept, "kept");
-    let found = Chart::new("Held-back samples: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
+    let found = Chart::new("Held-out samples: found", Axis::new("step"), Axis::new("fraction").unit("%").from_zero())
         .series(
             Series::new(format!("within {HIT_PX} px and {HIT_DEGREES}°"), curve(|r| 100.0 * r.validation.hit_rate()))
                 .with_markers(),
@@ -228,7 +231,7 @@ pub fn teaching(history: &History) -> Section {
             )
             .with_markers(),
         )
-        .caption("The network alone: its remaining false alarms are refused by the check against the demonstration.");
+        .caption("The network alone; the check against the demonstration refuses its remaining false alarms.");
     Section::new("Teaching")
         .lead(format!(
             "{} steps in {:.0} s; the network with the best validation was kept.",

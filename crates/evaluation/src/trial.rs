@@ -1,4 +1,4 @@
-//! Tests a model on unseen pictures of the simulator, against its ground truth.
+//! Tests a model on unseen pictures of the simulator, compared with the ground truth.
 
 use anyhow::Result;
 use image::RgbImage;
@@ -10,9 +10,9 @@ use sdg_simulation::views::{TestView, test_views};
 
 use crate::against_truth::{grasp_error, grasp_pose};
 
-/// Maximum position error of a right detection, in millimetres.
+/// Maximum position error of a correct detection, in millimetres.
 pub const RIGHT_MM: f64 = 10.0;
-/// Maximum angle error of a right detection, in degrees.
+/// Maximum angle error of a correct detection, in degrees.
 pub const RIGHT_DEGREES: f64 = 10.0;
 
 /// A picture and the model's detections in it.
@@ -23,31 +23,31 @@ pub struct Trial {
     pub present: bool,
     /// Score of the best detection, accepted or not; zero if there is none.
     pub best_score: f64,
-    /// Agreement of the best detection, if it was checked.
+    /// Agreement of the best detection with the demonstration, if it was checked.
     pub best_agreement: Option<f64>,
     /// The network's score of the best detection; zero if there is none.
     pub network_score: f64,
-    /// Error of the accepted detection, if the part is there and was found.
+    /// Error of the accepted detection, if the part is in the picture and was found.
     pub error: Option<DetectionError>,
-    /// Error of the best detection even if it was refused.
+    /// Error of the best detection, even if it was refused.
     pub best_error: Option<DetectionError>,
-    /// Duration of the detection.
+    /// Duration of the detection, in seconds.
     pub seconds: f64,
 }
 
 impl Trial {
-    /// Whether the part was in the picture and a grasp was found close enough to the ground truth.
+    /// Whether the part is in the picture and was found with an error within the limits.
     pub fn is_right(&self) -> bool {
         self.error.is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
     }
 
-    /// Whether the part was not in the picture but something was accepted.
+    /// Whether the part is not in the picture but a detection was accepted.
     pub fn is_false_alarm(&self) -> bool {
         !self.present && self.best_score >= 0.5
     }
 }
 
-/// Runs a model on `count` pictures with seeds from `seed` on, with or without the part.
+/// Runs a model on `count` pictures, with seeds from `seed`, with or without the part.
 pub fn try_views(
     model: &GraspModel,
     object: &ObjectSpec,
@@ -59,7 +59,7 @@ pub fn try_views(
     test_views(object, present, count, seed).map(|seen| try_view(model, object, &seen?, verification)).collect()
 }
 
-/// Runs a model on one picture; the part is in it if the picture has a ground truth.
+/// Runs a model on one picture. The part is in the picture if there is a ground truth.
 pub fn try_view(model: &GraspModel, object: &ObjectSpec, seen: &TestView, verification: Verification) -> Result<Trial> {
     let start = std::time::Instant::now();
     let detections = model.detect(&seen.view.image, verification)?;

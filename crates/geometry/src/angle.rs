@@ -1,13 +1,13 @@
-//! An angle that never leaves (-π, π].
+//! An angle, wrapped into (-π, π] by its constructors.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-/// An angle in radians, kept in (-π, π].
+/// An angle in radians. The constructors wrap it into (-π, π]; deserialisation takes any number.
 ///
-/// In an image, where y points down, a positive angle turns clockwise as seen.
+/// In an image, where y points down, a positive angle is clockwise.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Angle(f64);
@@ -54,13 +54,13 @@ impl Angle {
         Self::from_radians(class as f64 * TAU / num_classes as f64)
     }
 
-    /// The shortest rotation from `other` to `self`, without its sign, in radians in `[0, π]`.
+    /// The smallest angle between `self` and `other`, in radians, in `[0, π]`.
     pub fn distance(self, other: Self) -> f64 {
         (self - other).0.abs()
     }
 
-    /// As [`distance`](Self::distance), for directions that a turn by π does not change (lines, two-finger grippers):
-    /// `[0, π/2]`.
+    /// Like [`distance`](Self::distance), for directions that a rotation by π does not change (lines, two-finger
+    /// grippers): in `[0, π/2]`.
     pub fn distance_modulo_half_turn(self, other: Self) -> f64 {
         let distance = self.distance(other);
         distance.min(PI - distance)

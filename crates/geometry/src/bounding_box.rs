@@ -82,7 +82,7 @@ impl BoundingBox {
         }
     }
 
-    /// The overlap's area in square pixels.
+    /// The area of the overlap in square pixels.
     pub fn intersection(&self, other: &Self) -> f64 {
         let width = self.x2.min(other.x2) - self.x1.max(other.x1);
         let height = self.y2.min(other.y2) - self.y1.max(other.y1);
@@ -106,7 +106,7 @@ impl BoundingBox {
         Self { x1: self.x1 * scale_x, y1: self.y1 * scale_y, x2: self.x2 * scale_x, y2: self.y2 * scale_y }
     }
 
-    /// The four corners, clockwise as seen from the upper left.
+    /// The four corners, clockwise from the upper left.
     pub fn corners(&self) -> [Point2<f64>; 4] {
         [
             Point2::new(self.x1, self.y1),

@@ -5,9 +5,9 @@
 pub struct CompassSearch {
     /// First and last step, in units of the caller's neighbours.
     pub steps: (f64, f64),
-    /// A neighbour must be better by more than this.
+    /// Minimum gain of a move to a neighbour.
     pub min_gain: f64,
-    /// Rounds of at most eight evaluations each.
+    /// Maximum number of rounds. A round has at most eight evaluations.
     pub max_rounds: usize,
     /// No round starts after this many evaluations.
     pub max_evaluations: usize,

@@ -1,6 +1,6 @@
-//! Errors of a shape.
+//! The error type of this crate.
 
-/// Why a shape could not be made or read.
+/// The reason why a shape or a camera cannot be made or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -25,7 +25,7 @@ pub enum GeometryError {
         area: f64,
     },
     /// Run lengths that do not add up to the mask's size.
-    #[error("expected run lengths of {expected} pixels in all, found {found}")]
+    #[error("expected run lengths with a sum of {expected} pixels, found {found}")]
     RunLengthMismatch {
         expected: u64,
         /// The sum of the runs.

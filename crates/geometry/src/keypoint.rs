@@ -10,9 +10,9 @@ use crate::{Angle, PlanarSimilarity, Polygon};
 pub enum Visibility {
     /// Not labelled, or outside the image: the position is meaningless (COCO 0).
     Unlabelled,
-    /// Labelled though hidden (COCO 1).
+    /// Labelled, but hidden (COCO 1).
     Occluded,
-    /// Labelled and seen (COCO 2).
+    /// Labelled and visible (COCO 2).
     Visible,
 }
 
@@ -33,7 +33,7 @@ impl Keypoint {
         Self { x: point.x, y: point.y, visibility: Visibility::Visible }
     }
 
-    /// Its position, in pixels.
+    /// The position, in pixels.
     pub fn point(&self) -> Point2<f64> {
         Point2::new(self.x, self.y)
     }
@@ -44,8 +44,8 @@ impl Keypoint {
     }
 }
 
-/// The two points by which a person marks a grasp: the gripper's centre moves to their midpoint and its jaws
-/// close across the line. The direction from start to end is the grasp's angle.
+/// The two points with which a person marks a grasp: the gripper's centre moves to their midpoint, and its jaws close
+/// across the line. The direction from start to end is the grasp's angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GraspLine {
     /// The first point.
@@ -90,11 +90,10 @@ impl GraspLine {
             .collect()
     }
 
-    /// The jaw opening, in pixels, for closing on `part` across the midpoint of the line: from the outermost crossings
-    /// of its outline there. The gripper closes symmetrically about the midpoint, so that the wider half counts twice.
+    /// The jaw opening, in pixels, to grasp `part` across the midpoint of the line. The gripper closes symmetrically
+    /// about the midpoint, so the opening is twice the larger distance to the outermost crossings of the outline.
     ///
-    /// This opening is taught, and shown by the annotation page, for marks without an opening, as other tools write
-    /// them.
+    /// Used for marks without an opening, such as those of other tools, in teaching and on the annotation page.
     pub fn opening_across(&self, part: &Polygon) -> f64 {
         let center = self.center();
         let along = (self.end - self.start).normalize();
@@ -112,7 +111,7 @@ impl GraspLine {
         2.0 * most.max(-least)
     }
 
-    /// The line moved with its part.
+    /// The line, transformed with its part.
     pub fn transformed(&self, image_from_demonstration: &PlanarSimilarity) -> Self {
         Self { start: image_from_demonstration.apply(&self.start), end: image_from_demonstration.apply(&self.end) }
     }

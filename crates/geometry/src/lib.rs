@@ -1,5 +1,5 @@
-//! The value types that the other crates share: boxes, polygons, masks, keypoints, angles, the pinhole camera
-//! and the planar grasp; and two functions that several crates need, the convex hull and percentiles.
+//! The value types that the other crates use: boxes, polygons, masks, keypoints, angles, the pinhole camera and the
+//! planar grasp; and two functions that several crates need, the convex hull and percentiles.
 //!
 //! ```text
 //! annotation ─ BoundingBox, GraspLine, Polygon ─┐
@@ -7,11 +7,11 @@
 //! shape      ─ PlanarSimilarity ────────────────┘
 //! ```
 //!
-//! **Frames.** Pixels: x right, y down, the centre of the first pixel at (0.5, 0.5), so an image of width `w`
-//! spans `[0, w]`. Camera: the optical frame, x right, y down, z forward. World: whatever `world_from_camera`
-//! says; in this project the robot's base. Angles are radians.
+//! **Frames.** Pixels: x right, y down, the centre of the first pixel at (0.5, 0.5), so an image of width `w` spans
+//! `[0, w]`. Camera: the optical frame, x right, y down, z forward. World: the target of `world_from_camera`; in this
+//! project the robot's base. Angles are in radians.
 //!
-//! This crate deliberately has no pictures (the `image` crate), no tensors (burn) and no files.
+//! Not in this crate: pictures (the `image` crate), tensors (burn) and files.
 //!
 //! ```
 //! use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -59,7 +59,7 @@ pub use rotational_symmetry::RotationalSymmetry;
 pub use slant::Slant;
 pub use statistics::{median, percentile, upper_median};
 
-/// The README's example, which runs with the other examples.
+/// Runs the README's example with the other doc tests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

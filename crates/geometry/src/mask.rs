@@ -1,10 +1,10 @@
-//! Binary masks, and COCO's run-length coding of them.
+//! Binary masks and their COCO run-length encoding.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{BoundingBox, GeometryError};
 
-/// One bit for each pixel, rows from the top.
+/// One bit per pixel, row by row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mask {
     width: u32,
@@ -53,7 +53,7 @@ impl Mask {
         self.bits.iter().filter(|&&bit| bit).count()
     }
 
-    /// The tight box around the pixels inside, whole pixels included; `None` for an empty mask.
+    /// The tight box around the pixels inside, with their full area; `None` for an empty mask.
     pub fn bounds(&self) -> Option<BoundingBox> {
         let mut bounds: Option<BoundingBox> = None;
         for y in 0..self.height {
@@ -70,7 +70,7 @@ impl Mask {
 
     /// Intersection over union with a mask of the same size; zero when both are empty.
     pub fn iou(&self, other: &Self) -> f64 {
-        assert_eq!((self.width, self.height), (other.width, other.height), "masks of one image");
+        assert_eq!((self.width, self.height), (other.width, other.height), "masks of the same image");
         let (mut intersection, mut union) = (0usize, 0usize);
         for (&a, &b) in self.bits.iter().zip(&other.bits) {
             intersection += usize::from(a && b);
@@ -79,7 +79,7 @@ impl Mask {
         if union == 0 { 0.0 } else { intersection as f64 / union as f64 }
     }
 
-    /// The same mask as the lengths of its runs of equal pixels.
+    /// Encodes the mask as the lengths of its runs of equal pixels.
     pub fn encode(&self) -> RunLengthMask {
         let mut counts = Vec::new();
         let (mut run, mut inside) = (0u32, false);
@@ -103,7 +103,8 @@ impl Mask {
     }
 }
 
-/// COCO's uncompressed run-length coding: column by column, lengths of runs outside and inside in turn, outside first.
+/// COCO's uncompressed run-length encoding: column by column, the lengths of alternating runs outside and inside,
+/// outside first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunLengthMask {
     /// Height, width.

@@ -1,14 +1,14 @@
 /// The body to which a camera is fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
-    /// To the robot's hand: it moves with the flange.
+    /// The robot's hand: the camera moves with the flange.
     Hand,
-    /// To the robot's base or the room, beside the robot.
+    /// The robot's base, or a fixed place in the room.
     Base,
 }
 
 impl Mount {
-    /// The name in files and of options.
+    /// The name in files and options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hand => "hand",

@@ -1,21 +1,22 @@
-//! The outline of a part in a picture, as a careful person would click it: traced from a mask, then simplified.
+//! The outline of a part in a picture, similar to one marked carefully by a person: traced from a mask, then
+//! simplified.
 
 use nalgebra::Point2;
 
 use crate::{Mask, Polygon};
 
-/// Maximum number of points that a person would click.
+/// Maximum number of vertices: about as many as a careful person marks.
 const MAX_VERTICES: usize = 56;
 
-/// Initial largest distance of the simplified outline from the traced one, in pixels.
+/// Initial maximum distance of the simplified outline from the traced one, in pixels.
 const MIN_TOLERANCE_PX: f64 = 0.35;
 
-/// The outer outline of the largest piece of a mask, holes left out; `None` for an empty mask.
+/// The outer outline of the largest piece of a mask, without holes; `None` for an empty mask.
 ///
-/// It has 56 vertices at most: as many as a careful person would click.
+/// It has at most 56 vertices.
 ///
 /// # Units and frames
-/// Pixels; the centre of the first pixel is (0.5, 0.5). The points run clockwise as seen (y points down).
+/// Pixels; the centre of the first pixel is (0.5, 0.5). The points run clockwise (y points down).
 pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
     let traced = largest_boundary(mask)?;
     let mut tolerance = MIN_TOLERANCE_PX;
@@ -33,7 +34,7 @@ pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
 fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     let (width, height) = (mask.width() as i64, mask.height() as i64);
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width && y < height && mask.get(x as u32, y as u32);
-    // An upper edge has the mask below it and none above; each boundary has at least one.
+    // An upper edge has a pixel of the mask below it and none above; each boundary has at least one.
     let mut seen = vec![false; (width * height) as usize];
     let mut best: Option<(f64, Vec<Point2<f64>>)> = None;
     for y in 0..height {
@@ -47,7 +48,7 @@ fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
                 if heading == (1, 0) {
                     seen[(at.1 * width + at.0) as usize] = true;
                 }
-                // Midpoints of the pixels' edges: the path then cuts corners as the outline of the real part does.
+                // Midpoints of the pixels' edges: they smooth the steps of the boundary.
                 let middle = |a: i64, step: i64| a as f64 + 0.5 * step as f64;
                 corners.push(Point2::new(middle(at.0, heading.0), middle(at.1, heading.1)));
                 at = (at.0 + heading.0, at.1 + heading.1);
@@ -79,12 +80,12 @@ fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     best.map(|(_, corners)| corners).filter(|corners| corners.len() >= 12)
 }
 
-/// Positive for a ring that runs clockwise as seen with y down; holes have the opposite sense.
+/// Positive for a ring that runs clockwise with y down; holes run in the opposite direction.
 fn signed_area(ring: &[Point2<f64>]) -> f64 {
     (0..ring.len()).map(|idx| ring[idx].coords.perp(&ring[(idx + 1) % ring.len()].coords)).sum::<f64>() / 2.0
 }
 
-/// Douglas and Peucker's simplification of a closed ring, started at two points far from each other.
+/// Douglas and Peucker's simplification of a closed ring, split at two vertices far from each other.
 fn simplify_ring(ring: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>> {
     let far_from = |from: usize| {
         (0..ring.len())

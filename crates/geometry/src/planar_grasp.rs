@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Angle, GraspLine, Keypoint};
 
-/// A top grasp in pixels: position of the gripper's centre, its turn, its opening.
+/// A top grasp in pixels: position of the gripper's centre, angle and opening.
 ///
-/// The angle is that of the marked line, start to end; the jaws close across it.
+/// The angle is the direction of the marked line from start to end; the jaws close across it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanarGrasp {
     /// Pixels to the right.
@@ -27,14 +27,14 @@ impl PlanarGrasp {
         Self { x: center.x, y: center.y, angle: line.angle(), width }
     }
 
-    /// Computes the grasp from keypoints on a line: the centre is their mean, the angle that of the least-squares
-    /// line, directed from the first keypoints to the last. Unlabelled keypoints are ignored.
+    /// Computes the grasp from keypoints on a line: the centre is their mean, the angle is the direction of the
+    /// least-squares line, from the first keypoints to the last. Unlabelled keypoints are ignored.
     ///
     /// `None` when fewer than two labelled keypoints remain or when they all coincide.
     ///
     /// # Source
-    /// Paper, section IV-C. The original takes the mode of whole degrees and folds it; total least squares with
-    /// `atan2` avoids both errors.
+    /// Paper, section IV-C. The original takes the most frequent whole degree and folds it; total least squares with
+    /// `atan2` avoids the errors of both steps.
     pub fn from_keypoints(keypoints: &[Keypoint], width: f64) -> Option<Self> {
         let labelled: Vec<(f64, Point2<f64>)> = keypoints
             .iter()
@@ -60,7 +60,7 @@ impl PlanarGrasp {
         if xx + yy <= f64::EPSILON * n {
             return None;
         }
-        // The principal axis of the scatter is the line that least squares fits across the line itself.
+        // The principal axis of the scatter is the line with the least squared distances.
         let axis = 0.5 * (2.0 * xy).atan2(xx - yy);
         let along = axis.cos() * forward.x + axis.sin() * forward.y;
         let angle = Angle::from_radians(if along < 0.0 { axis + std::f64::consts::PI } else { axis });

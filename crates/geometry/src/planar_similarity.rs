@@ -1,4 +1,4 @@
-//! Turn, scale and shift in the image plane: the pose of the demonstration in another image.
+//! Rotation, scale and shift in the image plane: the pose of the demonstration in another image.
 
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -8,9 +8,9 @@ use crate::Angle;
 /// p' = scale · R(angle) · p + (tx, ty), in pixels with y down; never mirrored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanarSimilarity {
-    /// Factor of lengths, positive.
+    /// Scale factor, positive.
     pub scale: f64,
-    /// Turn; positive is clockwise as seen, because y points down.
+    /// Rotation; positive is clockwise, because y points down.
     pub angle: Angle,
     /// Shift to the right, in pixels.
     pub tx: f64,
@@ -22,12 +22,12 @@ impl PlanarSimilarity {
     /// The identity.
     pub const IDENTITY: Self = Self { scale: 1.0, angle: Angle::ZERO, tx: 0.0, ty: 0.0 };
 
-    /// A shift to the right and down, in pixels.
+    /// A shift by (tx, ty), in pixels.
     pub fn translation(tx: f64, ty: f64) -> Self {
         Self { tx, ty, ..Self::IDENTITY }
     }
 
-    /// Turns by `angle` and scales about `center`, then moves `center` to `target`.
+    /// Rotates by `angle` and scales about `center`, then moves `center` to `target`.
     pub fn about(center: Point2<f64>, target: Point2<f64>, angle: Angle, scale: f64) -> Self {
         let mut made = Self { scale, angle, tx: 0.0, ty: 0.0 };
         let moved = made.apply(&center);
@@ -36,10 +36,10 @@ impl PlanarSimilarity {
         made
     }
 
-    /// The least-squares similarity that sends `from[i]` to `to[i]`; `None` for fewer than two distinct points.
+    /// The least-squares similarity that maps `from[i]` to `to[i]`; `None` for fewer than two distinct points.
     ///
     /// # Source
-    /// Umeyama 1991, in two dimensions, where complex numbers give the closed form.
+    /// Umeyama 1991; in two dimensions, complex numbers give the closed form.
     pub fn fit(from: &[Point2<f64>], to: &[Point2<f64>]) -> Option<Self> {
         assert_eq!(from.len(), to.len(), "points come in pairs");
         if from.len() < 2 {
@@ -72,12 +72,12 @@ impl PlanarSimilarity {
         )
     }
 
-    /// `self`, followed by a shift of this many pixels to the right and down.
+    /// `self`, followed by a shift of `by`, in pixels.
     pub fn shifted(&self, by: Vector2<f64>) -> Self {
         Self { tx: self.tx + by.x, ty: self.ty + by.y, ..*self }
     }
 
-    /// `self` after `first`: c_from_a = c_from_b.compose(b_from_a).
+    /// `self` after `first`: `c_from_a = c_from_b.compose(b_from_a)`.
     pub fn compose(&self, first: &Self) -> Self {
         let shift = self.apply(&Point2::new(first.tx, first.ty));
         Self { scale: self.scale * first.scale, angle: self.angle + first.angle, tx: shift.x, ty: shift.y }

@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::{BoundingBox, GeometryError, Mask, PlanarSimilarity};
 
-/// A closed polygon in pixels; the last vertex joins the first.
+/// A closed polygon in pixels; the last vertex is connected to the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Polygon {
-    /// The vertices, in either direction of turn.
+    /// The vertices, clockwise or counter-clockwise.
     pub vertices: Vec<Point2<f64>>,
 }
 
 impl Polygon {
-    /// A polygon with an area.
+    /// Checks the vertices and builds the polygon.
     ///
     /// # Errors
     /// Fewer than three vertices, coordinates that are not finite, or no area.
@@ -44,12 +44,12 @@ impl Polygon {
         (0..n).map(move |i| (self.vertices[i], self.vertices[(i + 1) % n]))
     }
 
-    /// The area enclosed, in square pixels.
+    /// The enclosed area, in square pixels.
     pub fn area(&self) -> f64 {
         (0.5 * self.edges().map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>()).abs()
     }
 
-    /// The centre of the area enclosed.
+    /// The centroid of the enclosed area.
     pub fn centroid(&self) -> Point2<f64> {
         let (mut doubled, mut x, mut y) = (0.0, 0.0, 0.0);
         for (a, b) in self.edges() {
@@ -61,7 +61,7 @@ impl Polygon {
         Point2::new(x / (3.0 * doubled), y / (3.0 * doubled))
     }
 
-    /// The tight box around the vertices; an empty box without vertices.
+    /// The tight box around the vertices; an empty box if there are none.
     pub fn bounds(&self) -> BoundingBox {
         BoundingBox::around(self.vertices.iter().copied()).unwrap_or(BoundingBox { x1: 0.0, y1: 0.0, x2: 0.0, y2: 0.0 })
     }
@@ -75,7 +75,8 @@ impl Polygon {
         })
     }
 
-    /// The share of this area that lies inside another polygon, in `[0, 1]`, from a grid of 16 × 16 points over its box.
+    /// The fraction of this area that lies inside another polygon, in `[0, 1]`, from a grid of 16 × 16 points over its
+    /// box.
     pub fn share_inside(&self, other: &Self) -> f64 {
         const SIDE: u32 = 16;
         let bounds = self.bounds();
@@ -90,7 +91,7 @@ impl Polygon {
         f64::from(shared) / f64::from(own.max(1))
     }
 
-    /// Distance from a point to the nearest edge, in pixels, inside and outside alike.
+    /// Distance from a point, inside or outside, to the nearest edge, in pixels.
     pub fn distance_to_edge(&self, point: &Point2<f64>) -> f64 {
         self.edges()
             .map(|(a, b)| {
@@ -101,7 +102,7 @@ impl Polygon {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether two edges that do not share a vertex meet.
+    /// Whether two edges without a common vertex intersect.
     pub fn crosses_itself(&self) -> bool {
         let edges: Vec<_> = self.edges().collect();
         let side = |a: Point2<f64>, b: Point2<f64>, p: Point2<f64>| (b - a).perp(&(p - a));
@@ -116,13 +117,13 @@ impl Polygon {
         })
     }
 
-    /// The part inside an image of `width` × `height` pixels, as one polygon; empty when nothing is inside.
+    /// The part inside an image of `width` × `height` pixels, as one polygon; empty if no part is inside.
     ///
     /// # Source
-    /// Sutherland and Hodgman 1974; the pieces of a divided concave polygon stay connected along the border.
+    /// Sutherland and Hodgman 1974. If clipping divides a concave polygon, its pieces stay connected along the border.
     pub fn clip(&self, width: f64, height: f64) -> Self {
         let mut vertices = self.vertices.clone();
-        // Each border as (axis, bound, side that is inside).
+        // Each border as (axis, bound, whether the inside is below the bound).
         for (axis, bound, keep_below) in [(0, 0.0, false), (0, width, true), (1, 0.0, false), (1, height, true)] {
             let inside = |p: &Point2<f64>| if keep_below { p[axis] <= bound } else { p[axis] >= bound };
             let mut kept = Vec::with_capacity(vertices.len() + 4);
@@ -141,7 +142,7 @@ impl Polygon {
         Self { vertices }
     }
 
-    /// The polygon moved with its part.
+    /// The polygon, transformed with its part.
     pub fn transformed(&self, target_from_source: &PlanarSimilarity) -> Self {
         Self { vertices: self.vertices.iter().map(|v| target_from_source.apply(v)).collect() }
     }

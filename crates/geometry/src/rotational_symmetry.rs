@@ -1,4 +1,4 @@
-//! The turns of a part that cannot be distinguished from no turn.
+//! The rotations of a part that change neither its appearance nor its grasp.
 
 use std::f64::consts::TAU;
 
@@ -6,24 +6,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::Angle;
 
-/// Turns about the vertical that change neither the appearance of a part nor its grasp.
+/// The rotations about the vertical that change neither the appearance of a part nor its grasp.
 ///
 /// In JSON: `"none"`, `{"fold": 4}` or `"full"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum RotationalSymmetry {
-    /// Every direction looks different.
+    /// No rotation except the identity.
     #[default]
     None,
-    /// This many equal turns make a full one, at least two: a turn by any of them is not visible.
+    /// The multiples of a full rotation divided by this number, which is at least two.
     Fold(u32),
-    /// The part looks the same at every turn.
+    /// All rotations.
     Full,
 }
 
 impl RotationalSymmetry {
-    /// The smallest of the turns equivalent to `turn`.
+    /// The smallest of the rotations equivalent to `turn`.
     pub fn visible(self, turn: Angle) -> Angle {
         match self {
             Self::None => turn,
@@ -35,7 +35,7 @@ impl RotationalSymmetry {
         }
     }
 
-    /// The shortest turn from one direction to the other or to an equivalent one, in radians, not negative.
+    /// The smallest rotation from one direction to the other or to an equivalent one, in radians, not negative.
     pub fn distance(self, one: Angle, other: Angle) -> f64 {
         self.visible(one - other).radians().abs()
     }

@@ -1,24 +1,25 @@
-//! A table seen by a camera at a slant, and the picture that a camera vertically above it would have taken.
+//! A table viewed at a slant, and the picture that a camera vertically above it would have taken.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::Angle;
 
-/// The view of an uncalibrated camera of the table: its lens is assumed, and at the centre of the picture lengths
-/// across the slant equal those of the level picture.
+/// The view of the table by an uncalibrated camera, with an assumed lens. At the centre of the picture, lengths across
+/// the slant equal those of the level picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Slant {
-    /// Angle between the camera's axis and the table's normal, in radians, from 0 to less than a quarter turn.
+    /// Angle between the camera's axis and the table's normal, in radians, from 0 to less than π/2.
     pub tilt_rad: f64,
-    /// The direction of the picture in which the table recedes.
+    /// The direction in the picture in which the table recedes.
     pub away: Angle,
     /// Focal length, in pixels of the picture.
     pub focal_px: f64,
 }
 
 impl Slant {
-    /// The position of a level point in the slanted picture; both from the picture's centre. `None` behind the camera.
+    /// The position of a level point in the slanted picture; both relative to the picture's centre. `None` behind the
+    /// camera.
     pub fn picture_from_level(&self, level: Vector2<f64>) -> Option<Vector2<f64>> {
         let [away, aside] = self.axes();
         let (sin, cos) = self.tilt_rad.sin_cos();
@@ -26,8 +27,8 @@ impl Slant {
         (depth > MIN_DEPTH).then(|| (level.dot(&away) * cos * away + level.dot(&aside) * aside) / depth)
     }
 
-    /// The level point at a position of the slanted picture; both from the picture's centre. `None` at the horizon and
-    /// beyond.
+    /// The level point at a position of the slanted picture; both relative to the picture's centre. `None` at the
+    /// horizon and beyond.
     pub fn level_from_picture(&self, seen: Vector2<f64>) -> Option<Vector2<f64>> {
         let [away, aside] = self.axes();
         let (sin, cos) = self.tilt_rad.sin_cos();
@@ -40,13 +41,13 @@ impl Slant {
         Some(along * away + seen.dot(&aside) * depth * aside)
     }
 
-    /// The level point vertically below the camera, from the picture's centre.
+    /// The level point vertically below the camera, relative to the picture's centre.
     pub fn below_camera(&self) -> Point2<f64> {
         Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
     }
 
-    /// The foreshortening of a short line at a place of the picture: (ln of the longest over the shortest length,
-    /// direction of the shortest); `None` as for [`Self::level_from_picture`].
+    /// The foreshortening of a short line at a position of the picture: ln of the longest over the shortest length, and
+    /// the direction of the shortest; `None` as for [`Self::level_from_picture`].
     pub fn shortening_at(&self, seen: Vector2<f64>) -> Option<(f64, Angle)> {
         const STEP_PX: f64 = 0.5;
         let level = self.level_from_picture(seen)?;
@@ -54,7 +55,7 @@ impl Slant {
             Some((self.picture_from_level(level + step)? - self.picture_from_level(level - step)?) / (2.0 * STEP_PX))
         };
         let jacobian = Matrix2::from_columns(&[side(STEP_PX * Vector2::x())?, side(STEP_PX * Vector2::y())?]);
-        // Axes of the ellipse that is the image of a circle: lengths and directions.
+        // Axes of the ellipse onto which a small circle is mapped: lengths and directions.
         let ellipse = jacobian * jacobian.transpose();
         let (difference, cross) = (ellipse[(0, 0)] - ellipse[(1, 1)], 2.0 * ellipse[(0, 1)]);
         let (mean, radius) = (0.5 * ellipse.trace(), 0.5 * difference.hypot(cross));
@@ -69,7 +70,7 @@ impl Slant {
     }
 }
 
-/// Closer to the camera's plane, or to the horizon, nothing is returned.
+/// Minimum relative depth. Points closer to the camera's plane, or to the horizon, give `None`.
 const MIN_DEPTH: f64 = 0.1;
 
 #[cfg(test)]

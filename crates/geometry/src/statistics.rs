@@ -7,21 +7,20 @@ fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// The median of the finite values; for an even number the mean of the middle two, `None` without values.
+/// The median of the finite values; for an even number the mean of the middle two. `None` without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let sorted = sorted(values);
     let (upper, lower) = (sorted.len() / 2, sorted.len().checked_sub(1)? / 2);
     Some(0.5 * sorted[lower] + 0.5 * sorted[upper])
 }
 
-/// The median of the finite values; for an even number the upper of the middle two, `None` without values.
+/// The median of the finite values; for an even number the upper of the middle two. `None` without values.
 pub fn upper_median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let sorted = sorted(values);
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// The value that `percent` of the finite values do not exceed, by linear interpolation between two of them; `None`
-/// without values.
+/// The percentile of the finite values, by linear interpolation between neighbours; `None` without values.
 pub fn percentile(values: impl IntoIterator<Item = f64>, percent: f64) -> Option<f64> {
     let sorted = sorted(values);
     let last = sorted.len().checked_sub(1)?;
@@ -56,7 +55,7 @@ mod tests {
         assert_eq!(percentile(values, 50.0), Some(2.5));
         assert_eq!(percentile(values, 0.0), Some(1.0));
         assert_eq!(percentile(values, 100.0), Some(4.0));
-        // 90 % of the way from the first to the fourth is at index 2.7.
+        // Index 0.9 · 3 = 2.7, from 0.
         assert!((percentile(values, 90.0).unwrap() - 3.7).abs() < 1e-12);
         assert_eq!(percentile([], 50.0), None);
     }

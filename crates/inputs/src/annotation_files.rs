@@ -1,4 +1,4 @@
-//! Annotation files on disk: some formats keep labels in a second file.
+//! Annotation files on disk. Some formats keep labels in a second file.
 
 use std::path::{Path, PathBuf};
 
@@ -12,12 +12,12 @@ use crate::marks_check::MarkedPhoto;
 pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
 /// Name of the file with the labels of a YOLO dataset.
 pub const DATA_YAML: &str = "data.yaml";
-/// Other common names; searched after the first in each folder.
+/// Other common names, which are tried after [`DATA_YAML`] in each folder.
 const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
-/// Maximum number of folders between a label file and its data.yaml: labels/train/a.txt.
+/// Maximum number of folders between a label file and its data.yaml, as in labels/train/a.txt.
 const MAX_PARENT_FOLDERS: usize = 3;
 
-/// An annotation file, with the files that belong to it.
+/// An annotation file and the files that belong to it.
 pub struct AnnotationFile {
     /// The format, recognised by the content.
     pub format: AnnotationFormat,
@@ -30,7 +30,7 @@ impl AnnotationFile {
     /// Reads a file of any format.
     ///
     /// # Errors
-    /// A file cannot be read, or its format is unknown.
+    /// The file cannot be read, or its format is unknown.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
         let format = AnnotationFormat::of(&bytes).with_context(|| path.display().to_string())?;
@@ -47,7 +47,7 @@ impl AnnotationFile {
     /// The marks on one image.
     ///
     /// # Errors
-    /// Those of [`Annotation::read_with`].
+    /// The errors of [`Annotation::read_with`].
     pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
         Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
@@ -59,7 +59,7 @@ impl AnnotationFile {
     /// The marks on a photo, read upright and checked against its pixels. Marks of other objects are reported.
     ///
     /// # Errors
-    /// Those of [`Self::objects`] and of [`MarkedPhoto::checked`].
+    /// The errors of [`Self::objects`] and of [`MarkedPhoto::checked`].
     pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
         let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
         let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
@@ -77,18 +77,18 @@ impl AnnotationFile {
         }
     }
 
-    /// The contents of the file itself.
+    /// The contents of the annotation file.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 }
 
-/// The marks beside a photo: `photo.coco.json` (written by `sdg annotate` if another tool's photo.json must be kept),
-/// `photo.json` (written otherwise, or LabelMe), `photo.txt` (YOLO-pose), or the same below `labels` if a YOLO dataset
-/// keeps its pictures below `images`.
+/// Finds the marks beside a photo: `photo.coco.json` (written by `sdg annotate` if another tool's photo.json must be
+/// kept), `photo.json` (written otherwise, or LabelMe) or `photo.txt` (YOLO-pose); or a file of the same name below
+/// `labels`, if a YOLO dataset keeps its pictures below `images`.
 ///
 /// # Errors
-/// None of them exists; the message lists the searched names, and how to create one.
+/// No such file exists. The message lists the searched names and how to create one.
 pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     let in_labels = || {
         let folder = photo.parent()?;
@@ -138,7 +138,7 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     }
 }
 
-/// Writes the labels beside the output and returns their file. An existing data.yaml is kept.
+/// Writes the labels beside the output and returns the path of their file. An existing data.yaml is kept.
 ///
 /// # Errors
 /// An existing file contradicts the labels, or files cannot be read or written.
@@ -186,7 +186,7 @@ mod tests {
         for looked_for in ["images/train/a.json", "images/train/a.txt", "labels/train/a.txt", "sdg annotate"] {
             assert!(none.contains(looked_for), "{none}");
         }
-        // From the least to the most preferred, so that each is found although the others exist.
+        // In ascending order of preference: each file is found although the previous ones exist.
         for name in ["labels/train/a.txt", "images/train/a.txt", "images/train/a.json", "images/train/a.coco.json"] {
             fs::write(at(name), "").unwrap();
             assert_eq!(beside_photo(&at("images/train/a.jpg")).unwrap(), at(name));

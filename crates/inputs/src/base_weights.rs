@@ -12,14 +12,14 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, nam
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
 
-/// Facts on how this project's base weights were made, by names such as `seed`.
+/// How this project's base weights were made: facts by name, such as `seed`.
 pub type Origin = BTreeMap<String, String>;
 
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
 /// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and how
-/// they were made; `None` if the file is another one.
+/// they were made; `None` if the file is of another kind.
 ///
 /// # Errors
 /// The file cannot be read, the weights are of another preset, or a named part does not exist.
@@ -41,7 +41,7 @@ pub fn read_own(
         let names: Vec<String> = weights.parameters.keys().filter(|name| name.starts_with(prefix)).cloned().collect();
         if names.is_empty() {
             bail!(
-                "{}: expected the beginning of a parameter's name to start from nothing, found \"{prefix}\"",
+                "{}: expected the beginning of the names of parameters to initialise randomly, found \"{prefix}\"",
                 path.display()
             );
         }
@@ -63,7 +63,7 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
 }
 
 /// Reads the weights in `path` for `network`, without the parts named in `reinitialized`. If the file contains only a
-/// backbone, the rest of the network is initialised randomly without being named.
+/// backbone, the rest of the network is initialised randomly and need not be named.
 ///
 /// `tell` receives the report before any error.
 ///
@@ -95,12 +95,12 @@ pub fn read(
     })
 }
 
-/// Weights depend on the channel order and range of their input: on other numbers the same kernels are useless.
+/// Checks the channel order and the range of the input: a network's weights are useless for any other input.
 fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let naming = naming_of(checkpoint)?;
     let made_for = match (checkpoint.metadata.get("network"), naming) {
         (Some(network), Naming::Ours) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
-        // A file of this project without this information cannot be compared.
+        // A file of this project without this information cannot be checked.
         (None, Naming::Ours) => return Ok(()),
         _ => preset_of_kind(preset_for(naming)?, kind_of(network))?,
     };
@@ -108,7 +108,7 @@ fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let says = |input: &ImageTransformConfig| (input.channel_order, input.pixel_range, input.mean, input.std);
     if says(expected) != says(found) {
         bail!(
-            "the weights know images as {:?} in {:?} with mean {:?}, the preset gives {:?} in {:?} with mean {:?}: \
+            "the weights are for images as {:?} in {:?} with mean {:?}, the preset uses {:?} in {:?} with mean {:?}: \
              Detectron2's weights are for r50-detectron2, torchvision's for r50-torchvision",
             found.channel_order,
             found.pixel_range,

@@ -14,11 +14,11 @@ use sdg_robot::workcell::Workcell;
 /// Maximum size of a camera file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A camera's file.
+/// A camera file.
 #[derive(Debug, Clone)]
 pub struct CameraFile {
     camera: CalibratedCamera,
-    /// The camera's pose.
+    /// The camera with its pose above the table.
     pub over_table: CameraOverTable,
 }
 
@@ -31,7 +31,7 @@ impl CameraFile {
         Ok(read(path)?.0.intrinsics)
     }
 
-    /// Reads a file that has the camera's pose.
+    /// Reads a camera file with the camera's pose.
     ///
     /// # Errors
     /// The file cannot be read or has no pose.
@@ -49,7 +49,7 @@ impl CameraFile {
         Ok(Perception::calibrated(model, &self.camera)?)
     }
 
-    /// Width and height of its pictures.
+    /// Width and height of the pictures.
     pub fn size_px(&self) -> [u32; 2] {
         [self.camera.intrinsics.width, self.camera.intrinsics.height]
     }
@@ -57,23 +57,24 @@ impl CameraFile {
     /// Checks that a picture can be from this camera.
     ///
     /// # Errors
-    /// A picture of another size.
+    /// The picture has a different size.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         self.check_size(picture.dimensions())
     }
 
-    /// The same by width and height.
+    /// Like [`Self::check_picture`], for a width and a height.
     ///
     /// # Errors
-    /// Another size.
+    /// The size is different.
     pub fn check_size(&self, size: (u32, u32)) -> Result<()> {
         Ok(self.camera.check_picture(size)?)
     }
 
-    /// Photos of this camera and their marks in the plan view of the marks' plane; heights over the table in metres.
+    /// Photos of this camera and their marks, in the plan view of the marks' plane. The heights are above the table, in
+    /// metres.
     ///
     /// # Errors
-    /// A photo has another size, or marks are outside the visible part of the plane.
+    /// A photo has a different size, or marks are outside the visible part of the plane.
     pub fn seen_from_above(
         &self,
         photos: &[Demonstration],
@@ -84,17 +85,17 @@ impl CameraFile {
         Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
     }
 
-    /// Pictures of this camera without the part, in the same plan view.
+    /// Pictures of this camera without the part, in the same plan view as the photos.
     ///
     /// # Errors
-    /// A picture of another size than the camera's.
+    /// The size of a picture is not the camera's.
     pub fn pictures_from_above(&self, pictures: &[RgbImage], lengths: &Lengths) -> Result<Vec<RgbImage>> {
         pictures.iter().try_for_each(|picture| self.check_picture(picture))?;
         Ok(pictures_from_above(pictures, &self.over_table, lengths)?)
     }
 }
 
-/// The perception of a model's file with a camera's file, if one is given.
+/// The perception of a model file, with a camera file if one is given.
 ///
 /// # Errors
 /// The camera file cannot be used, or the camera does not see the plane of the marks (with the camera file's name); or
@@ -102,14 +103,14 @@ impl CameraFile {
 pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
     let Some(path) = camera else { return Ok(Perception::of_any_camera(model)) };
     CameraFile::read(path)?.perception(model).map_err(|error| {
-        // A plane that is not visible is an error of the camera's file.
+        // A plane that is not visible is an error of the camera file.
         let is_of_camera = matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::PlanView(_))));
         let file = if is_of_camera { path } else { model_file };
         error.context(file.display().to_string())
     })
 }
 
-/// The camera of a file, mounted as defined in a workcell.
+/// The camera of a file, mounted as the workcell defines.
 ///
 /// # Errors
 /// The file lacks the pose for this mounting.
@@ -117,7 +118,7 @@ pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> R
     MountedCamera::new(camera, workcell.mount, workcell.table_height_m).with_context(|| path.display().to_string())
 }
 
-/// Reads a camera's file, with or without a pose: the camera, and the text for rewriting the file.
+/// Reads a camera file, with or without a pose. Returns the camera, and the text for rewriting the file.
 pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
     let bytes = sdg_files::read(path, MAX_BYTES)?;
     let Ok(text) = String::from_utf8(bytes) else {

@@ -1,4 +1,4 @@
-//! Checkpoints as detectors: which detector a file is for, and whether its outputs equal the original's.
+//! Detectors from checkpoints: which detector a file is for, and whether its outputs equal the original's.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, naming_of};
 use crate::base_weights::open;
 use crate::detector_config::{architecture_of, preset, preset_for};
 
-/// The detector of a checkpoint: as configured, as stated in the file, or as derived from the names.
+/// The detector of a checkpoint: given by a configuration, stated in the file, or derived from the parameters' names.
 ///
 /// # Errors
-/// The names are unknown or fit no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
+/// The names are unknown or match no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
 pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_name: Option<&str>) -> Result<RcnnConfig> {
     if let Some(config) = config {
         return Ok(config);
@@ -60,7 +60,7 @@ pub fn verify_checkpoint(
     golden::verify(&detector, image, &reference).with_context(|| against.display().to_string())
 }
 
-/// The original's outputs; gradients keep the names of the original program.
+/// Reads the outputs of the original program. Gradients keep the original's names.
 fn read_reference(path: &Path) -> Result<StateDict> {
     const GRADIENTS: &str = "gradients.";
     let (mut source, outputs) = open(path)?;

@@ -12,12 +12,12 @@ use crate::annotation_files::AnnotationFile;
 /// Reads a photo and its marks.
 ///
 /// # Errors
-/// Files cannot be read, or the number of marked objects is not one.
+/// Files cannot be read, or the marks are not of exactly one object.
 pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
     let image = read_image(image_path)?;
     let file = AnnotationFile::read(annotation_path)?;
     let mut objects = file.objects_on(image_path, &image)?;
-    // Boxes of other objects, made by another tool or person.
+    // Objects without a grasp are boxes that another tool or person made.
     if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
         for other in objects.extract_if(.., |object| object.grasp.is_none()) {
             eprintln!("{}: skipped `{}`, which has no grasp", annotation_path.display(), other.label);

@@ -1,7 +1,7 @@
 //! The detector of a checkpoint: given by a preset, a configuration file, or the checkpoint's names.
 //!
-//! A configuration file is either an [`RcnnConfig`] as JSON, or the short form used beside reference outputs: kind,
-//! widths, sizes and thresholds that differ from the preset.
+//! A configuration file is either an [`RcnnConfig`] as JSON, or the short form that is stored beside reference outputs:
+//! the kind, widths, sizes and thresholds that differ from the preset.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
 /// Reads a configuration file of either form.
 ///
 /// # Errors
-/// The file cannot be read, is not JSON of either form, or contradicts itself.
+/// The file cannot be read, has neither form, or contradicts itself.
 pub fn read_config(path: &Path) -> Result<RcnnConfig> {
     let named = || path.display().to_string();
     let bytes = sdg_files::read(path, MAX_CONFIG_BYTES)?;
@@ -30,10 +30,10 @@ pub fn read_config(path: &Path) -> Result<RcnnConfig> {
     RcnnConfig::from_json(text).with_context(named)
 }
 
-/// The detector with this name, with the checkpoint's number of classes and keypoints.
+/// The preset of this name, with the checkpoint's number of classes and keypoints.
 ///
 /// # Errors
-/// The name is unknown, or the checkpoint has no class scores or a head that the preset cannot have.
+/// The name is unknown, or the checkpoint has no class scores or has a head that the preset cannot have.
 pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
     let naming = naming_of(checkpoint)?;
     let SecondStage { num_classes, num_keypoints, has_masks } = SecondStage::of(checkpoint, naming)?;
@@ -47,7 +47,7 @@ pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
     Ok(preset_of_kind(name, kind)?)
 }
 
-/// The second stage that a configuration describes.
+/// The kind of second stage that a configuration describes.
 pub fn kind_of(config: &RcnnConfig) -> RcnnKind {
     let RoiHeadsConfig { num_classes, ref keypoint_head, ref mask_head, .. } = config.roi_heads;
     match (keypoint_head, mask_head) {
@@ -57,7 +57,7 @@ pub fn kind_of(config: &RcnnConfig) -> RcnnKind {
     }
 }
 
-/// The detector with this name and another second stage.
+/// The preset of this name with a second stage of another kind.
 ///
 /// # Errors
 /// An unknown name.
@@ -69,7 +69,7 @@ pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig, ConfigEr
     }
 }
 
-/// The preset with the numerics of a checkpoint's program.
+/// The preset whose numerics are those of a checkpoint's program.
 ///
 /// # Errors
 /// There is no preset for this program.
@@ -135,7 +135,7 @@ mod tests {
     use sdg_grasp::Device;
     use sdg_layers::state_dict;
 
-    /// Names and shapes are listed without building the network; a built network verifies the list.
+    /// The list is made without building the network; this test compares it with a built network.
     #[test]
     fn the_listed_parameters_are_those_of_a_built_detector() {
         let mut narrow = presets::r50_detectron2(RcnnKind::Faster { num_classes: 3 });

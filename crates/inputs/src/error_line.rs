@@ -1,6 +1,6 @@
 //! An error and its causes as one line.
 
-/// The error and its causes on one line, each cause once: messages often already contain their cause.
+/// Joins the error and its causes to one line. A cause is left out if the text so far contains it already.
 pub fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {

@@ -1,12 +1,12 @@
 //! Reads a user's files: photos with their marks, cameras, workcells, models, initial weights.
 //!
 //! ```text
-//! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: are they this photo's? ─ Demonstration
+//! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: checked against the photo ─ Demonstration
 //! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Every error names the file. Deliberately absent: command arguments, and outputs.
+//! Every error names the file. Not in this crate: command arguments and outputs.
 //!
 //! ```no_run
 //! use std::path::Path;

@@ -8,29 +8,29 @@ use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, marks_fit, oth
 
 use crate::pictures;
 
-/// Minimum ratio of fits that shows that marks were made on one of two pictures. Chosen by hand.
+/// Minimum ratio of two fits for the better one to be preferred. Chosen by hand.
 const MIN_GAIN: f64 = 1.25;
-/// Minimum correlation of grey values around the marks for two files of the same picture: one of them may be a strongly
-/// compressed JPEG, a greyscale copy or a darker one. Chosen by hand.
+/// Minimum correlation of grey values around the marks for two files to be of the same picture: one of them may be a
+/// strongly compressed JPEG, a greyscale copy or a darker one. Chosen by hand.
 const MIN_CORRELATION: f64 = 0.9;
 
 /// An upright photo, and the files of photo and marks.
 pub struct MarkedPhoto<'a> {
     pub photo: &'a Path,
     pub image: &'a RgbImage,
-    /// The marks' file.
+    /// The file of the marks.
     pub marks: &'a Path,
-    /// Its contents.
+    /// The contents of that file.
     pub bytes: &'a [u8],
-    /// The photo's name in the marks' file.
+    /// The photo's name according to that file.
     pub file_name: Option<&'a str>,
 }
 
 impl MarkedPhoto<'_> {
-    /// The marks that `read` gives for the upright photo; several, or none if the part is not there.
+    /// The marks that `read` returns for the upright photo: one, several, or none if the part is not in it.
     ///
     /// # Errors
-    /// Those of `read`; the marks fit the stored pixels at least as well.
+    /// The errors of `read`; or the marks fit the pixels as stored at least as well.
     pub fn upright<T>(
         &self,
         read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
@@ -41,17 +41,17 @@ impl MarkedPhoto<'_> {
         Ok(marked)
     }
 
-    /// Reports an applied orientation, after all fallible steps.
+    /// Reports an applied orientation. Called after all fallible steps.
     fn report_orientation(&self, is_turned: bool) {
         if is_turned {
             eprintln!(
-                "{}: turned as its Exif orientation says; the marks are read on the turned photo",
+                "{}: rotated as its Exif orientation says; the marks are read on the rotated photo",
                 self.photo.display()
             );
         }
     }
 
-    /// The marks, and whether the photo is rotated by its orientation.
+    /// The marks, and whether the photo's orientation was applied.
     fn read_upright<T>(
         &self,
         read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
@@ -73,9 +73,8 @@ impl MarkedPhoto<'_> {
             if as_stored > 0.0 && as_shown <= MIN_GAIN * as_stored {
                 let as_well = if as_stored > MIN_GAIN * as_shown { "" } else { " just as well" };
                 bail!(
-                    "{}: expected marks on the photo as viewers show it, found marks that fit its pixels as they are \
-                     stored{as_well}: an Exif orientation turns {}, which tools of marks may ignore; save the photo upright \
-                     without the tag and mark it anew",
+                    "{}: expected marks on the photo as viewers show it, found marks that fit the stored \
+                     pixels{as_well}: an Exif orientation rotates {}, which annotation tools may ignore; save the photo upright without the tag and mark it again",
                     self.marks.display(),
                     self.photo.display()
                 );
@@ -85,17 +84,17 @@ impl MarkedPhoto<'_> {
         Ok((marked?, is_turned))
     }
 
-    /// The same for a demonstration, in which the part must be clearly visible.
+    /// Like [`Self::upright`], for a demonstration, in which the part must be clearly visible.
     ///
     /// # Errors
-    /// Those of [`Self::upright`]; the marks fit in another reading, or name another existing picture.
+    /// The errors of [`Self::upright`]; or the marks fit in another reading, or name another existing picture.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();
         if let Some(other) = self.other_picture(&annotations) {
             bail!("{}: {other}", self.marks.display());
         }
-        // Marks without a grasp are not taught, and the missing points are reported.
+        // Marks without a grasp are not taught; the missing points are reported elsewhere.
         let grasps: Vec<&Annotation> = annotations.into_iter().filter(|one| one.grasp.is_some()).collect();
         if let Some(reading) = other_reading(self.image, &grasps) {
             bail!(
@@ -109,7 +108,7 @@ impl MarkedPhoto<'_> {
         Ok(marked)
     }
 
-    /// The error if the file names another existing picture that the marks fit as well.
+    /// The text of the error, if the file names another existing picture that the marks fit as well.
     fn other_picture(&self, marked: &[&Annotation]) -> Option<String> {
         let (field, name) = AnnotationFormat::named_picture(self.bytes)?;
         let base_name = name.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
@@ -127,8 +126,8 @@ impl MarkedPhoto<'_> {
         let fit = |image: &RgbImage| marked.iter().map(|one| marks_fit(image, one)).sum::<f64>();
         (fit(self.image) <= MIN_GAIN * fit(&other)).then(|| {
             format!(
-                "{field}: expected {} or a name that is no other picture\'s, found `{base_name}`, another picture that is \
-                 there and that the marks fit as well",
+                "{field}: expected {} or a name of no existing picture, found `{base_name}`, another picture that the \
+                 marks fit as well",
                 self.photo.display()
             )
         })

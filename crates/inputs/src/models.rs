@@ -7,19 +7,19 @@ use anyhow::{Context, Result};
 use sdg_files::{read, read_bounded};
 use sdg_grasp::{Device, GraspModel, summarize};
 
-/// Maximum size of a grasp model's file.
+/// Maximum size of a model file.
 const MAX_MODEL_BYTES: u64 = 2 << 30;
 
-/// Reads a grasp model onto a device.
+/// Reads a grasp model and loads it onto a device.
 pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
     let bytes = read(path, MAX_MODEL_BYTES)?;
     GraspModel::from_bytes(&bytes, device).with_context(|| path.display().to_string())
 }
 
-/// Checks that a model's file replaces only an existing model.
+/// Checks that only an existing model is replaced by a model file.
 ///
 /// # Errors
-/// Another file has that name.
+/// A file of another kind has that name.
 pub fn check_replaces_a_model(path: &Path) -> Result<()> {
     let bytes = match File::open(path) {
         Ok(file) => read_bounded(file, path, MAX_MODEL_BYTES)?,

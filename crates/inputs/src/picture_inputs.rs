@@ -9,7 +9,7 @@ use sdg_demonstration::{IMAGE_EXTENSIONS, PixelFrame};
 
 use crate::pictures::{UNREADABLE_EXTENSIONS, read_image_in, read_standard_input_image};
 
-/// The name of standard input among files.
+/// The name that stands for standard input.
 pub const STANDARD_INPUT: &str = "-";
 /// Maximum number of skipped files named in a message.
 const MAX_NAMED: usize = 20;
@@ -22,7 +22,7 @@ pub enum PictureInput {
 }
 
 impl PictureInput {
-    /// Name in results: the path as given, `-` for standard input.
+    /// The name in results: the path as given, or `-` for standard input.
     pub fn name(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),
@@ -38,7 +38,7 @@ impl PictureInput {
         }
     }
 
-    /// An unused name for its drawing: pictures of several folders may have equal names.
+    /// An unused file name for the drawing: pictures in different folders may have equal names.
     pub fn drawn_name(&self, taken: &mut BTreeSet<String>) -> String {
         let stem = match self {
             Self::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -51,16 +51,16 @@ impl PictureInput {
     }
 }
 
-/// The pictures of an argument, and other files in the folder that it names.
+/// The pictures of an argument, and the other files in its folder.
 #[derive(Debug)]
 pub struct PictureInputs {
     pub pictures: Vec<PictureInput>,
-    /// The skipped files in words; `None` if there are none.
+    /// A text that names the skipped files; `None` if there are none.
     pub skipped: Option<String>,
 }
 
-/// The pictures of an argument. Of a folder: all files with a picture's extension, also unsupported ones (HEIC), so
-/// that their error is printed; subfolders are left out.
+/// The pictures of an argument. For a folder: all files with a picture's extension, and also unsupported formats
+/// (HEIC), so that their error is printed. Subfolders are left out.
 ///
 /// # Errors
 /// The folder cannot be listed or has no pictures.

@@ -10,12 +10,12 @@ use sdg_files::{read, read_bounded};
 /// Maximum size of a picture's file.
 const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
-/// Reads an upright picture of any format of [`decode_image_in`].
+/// Reads a picture of any format of [`decode_image_in`], rotated upright.
 pub fn read_image(path: &Path) -> Result<RgbImage> {
     read_image_in(path, PixelFrame::Upright)
 }
 
-/// The same with the pixels' orientation given: for a calibration, the sensor's.
+/// Like [`read_image`], with the orientation of the pixels given; a calibration needs the sensor's.
 pub fn read_image_in(path: &Path, frame: PixelFrame) -> Result<RgbImage> {
     let bytes = read(path, MAX_IMAGE_BYTES)?;
     decode_image_in(&bytes, &ImageLimits::default(), frame).with_context(|| path.display().to_string())
@@ -27,23 +27,23 @@ pub fn read_sensor_pixels_if_turned(photo: &Path) -> Result<Option<RgbImage>> {
     is_turned.then(|| read_image_in(photo, PixelFrame::Sensor)).transpose()
 }
 
-/// Checks that no Exif orientation rotates a photo whose marks must be in the pixels of a calibrated camera: it is
-/// unknown in which of the two frames they were made.
+/// Checks that no Exif orientation rotates a photo whose marks must be in the pixels of a calibrated camera: the frame
+/// of such marks would be unknown.
 ///
 /// # Errors
 /// The photo is rotated.
 pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     if is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?) {
         bail!(
-            "{}: expected a photo of the calibrated camera that no Exif orientation turns, found one: a calibration knows the \
-             sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks still fit, and mark it again if not",
+            "{}: expected a photo of the calibrated camera without an Exif orientation that rotates it, found one \
+             with it: the calibration is for the sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks still fit, and mark it again if not",
             photo.display()
         );
     }
     Ok(())
 }
 
-/// Formats that cannot be read, with an error that says what to do.
+/// Formats that cannot be read; their error says what to do.
 pub const UNREADABLE_EXTENSIONS: [&str; 4] = ["heic", "heif", "avif", "gif"];
 
 /// Reads a picture from standard input until its end.

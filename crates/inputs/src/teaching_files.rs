@@ -1,4 +1,4 @@
-//! The input files of a teaching.
+//! The input files from which a model is taught.
 
 use std::path::{Path, PathBuf};
 
@@ -17,17 +17,18 @@ pub struct TeachingFiles<'a> {
     pub demonstrations: &'a [(PathBuf, PathBuf)],
     /// Pictures without the part.
     pub negatives: &'a [PathBuf],
-    /// The calibrated camera that took all of them, and the heights over the table of marks and grasp, in metres.
+    /// The calibrated camera that took all pictures, and the heights above the table of the marks and of the grasp, in
+    /// metres.
     pub camera: Option<(&'a Path, [f64; 2])>,
 }
 
 impl TeachingFiles<'_> {
-    /// The demonstrations, with a camera in the plan view of the marks' plane. Pictures without the part and the
-    /// lengths are put into the options. A region in the options is set to apply to pictures of the first photo's size.
+    /// Reads the demonstrations; with a camera, in the plan view of the marks' plane. Adds the pictures without the
+    /// part and the lengths to the options, and sets the size of pictures for a region in the options to that of the
+    /// first photo.
     ///
-    /// # Errors
-    /// Files cannot be read; with a camera, a photo is rotated by an Exif orientation, has another size, or has marks
-    /// that the camera does not see; the region is not inside the first photo.
+    /// Files cannot be read; with a camera: a photo is rotated by an Exif orientation, has a different size, or has
+    /// marks that are outside the visible part of the plane; the region is not inside the first photo.
     pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {
         let mut pixel_frame = PixelFrame::Upright;
         if self.camera.is_some() {

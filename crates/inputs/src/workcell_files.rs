@@ -1,14 +1,14 @@
-//! Workcells on disk.
+//! Workcell files.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use sdg_robot::workcell::Workcell;
 
-/// Maximum size of a workcell's file.
+/// Maximum size of a workcell file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Reads a workcell's file; the path of the camera's file is relative to its folder.
+/// Reads a workcell file. Returns the workcell, and the path of its camera file relative to the workcell file's folder.
 ///
 /// # Errors
 /// The file is invalid (with the line), or cannot be read.

@@ -1,14 +1,14 @@
 //! All configurations of a Franka that reach a flange pose with joint 7 at a given angle, in closed form
 //! (`ClosedForm::Franka`).
 //!
-//! With q7 fixed the arm has six joints and at most eight solutions. Joint 7 determines, from the flange, the wrist
+//! With q7 fixed the arm has six joints and at most eight solutions. Seen from the flange, joint 7 determines the wrist
 //! centre W (the common origin of links 5 and 6) and the axis of joint 6. Shoulder S, elbow axis E and W then form a
-//! triangle of known sides: its angle at E is q4 (two solutions). The triangle may turn about SW by ψ; the forearm must
-//! be perpendicular to the axis of joint 6, which leaves two values of ψ. Shoulder (ZYZ Euler angles, two solutions)
-//! and wrist follow from the frames.
+//! triangle of known sides: its angle at E is q4 (two solutions). The triangle may rotate about SW by ψ; the forearm
+//! must be perpendicular to the axis of joint 6, which allows two values of ψ. Shoulder (ZYZ Euler angles, two
+//! solutions) and wrist follow from the frames.
 //!
-//! Only the geometry is considered: solutions may violate joint limits. If no solution exists, the nearest
-//! degenerate one is returned with its `infeasibility`, which gives a search over q7 a gradient.
+//! Only the geometry is considered: solutions may violate joint limits. If no solution exists, the nearest degenerate
+//! one is returned, with an `infeasibility` that gives a search over q7 a gradient.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,21 +17,21 @@ use nalgebra::{Isometry3, Vector3};
 use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
 
-/// Number of branches for one q7: elbow (2) × turn of the arm plane (2) × shoulder (2).
+/// Number of branches for one q7: elbow (2) × rotation of the arm plane (2) × shoulder (2).
 pub(crate) const NUM_BRANCHES: usize = 8;
 
 /// One solution of the inverse kinematics.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AnalyticSolution {
     pub q: JointVector,
-    /// 0 if the pose is met exactly; otherwise the excess of the construction's two cosines beyond [-1, 1].
+    /// 0 if the pose is reached exactly; otherwise the excess of the construction's two cosines beyond [-1, 1].
     pub infeasibility: f64,
 }
 
-/// The solutions for one q7, by branch; `None` if the construction degenerates.
+/// The solutions for one q7, by branch; `None` if the construction is degenerate.
 ///
-/// `q1_if_free` is used if the upper arm points along the axis of joint 1, where only q1 + q3 matters. Joint 6,
-/// whose range is not centred, is returned in [-π + 1.87, π + 1.87), centred on the middle of its range.
+/// `q1_if_free` is used if the upper arm points along the axis of joint 1, where only q1 + q3 is determined. Joint 6,
+/// whose range is not centred at 0, is returned in [-π + 1.87, π + 1.87), centred on the middle of its range.
 pub(crate) fn analytic_solutions(
     arm: &ArmGeometry,
     base_from_flange: &Isometry3<f64>,
@@ -117,7 +117,7 @@ pub(crate) fn analytic_solutions(
                 let (q1, q3) = if sin_q2 > MIN_SIN_Q2 {
                     ((sign * z3.y).atan2(sign * z3.x), (sign * y3.z).atan2(-sign * x3.z))
                 } else {
-                    // Upper arm upright: x3 is at q1 + q3 in the horizontal plane.
+                    // With an upright upper arm, x3 is at the angle q1 + q3 in the horizontal plane.
                     (q1_if_free, wrap(x3.y.atan2(x3.x) - q1_if_free))
                 };
                 let branch = (elbow_idx * 2 + turn_idx) * 2 + shoulder_idx;
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn every_solution_reaches_and_the_original_is_among_them() {
-        // Cosines near ±1 lose half of the digits: acos then has an accuracy of 1e-7 rad.
+        // Cosines near ±1 lose half of their digits, so acos has an accuracy of 1e-7 rad there.
         const TOLERANCE: f64 = 1e-6;
         let panda = ArmGeometry::panda();
         let limits = JointLimits::panda();

@@ -1,8 +1,8 @@
-//! The straight motion to a grasp from a pregrasp pose, with a configuration for which the whole motion satisfies the
+//! The straight motion from a pregrasp pose to a grasp, from a configuration for which the whole motion is within the
 //! limits.
 //!
-//! The best configuration for the first pose may reach a joint limit before the second. The arm has several branches
-//! and two interchangeable fingers, so that the choice is made over whole approaches.
+//! The best configuration for the pregrasp may lead to a joint limit before the grasp. The arm has several branches and
+//! two interchangeable fingers, so the choice is made among whole approaches.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ use crate::ik::{IkOptions, IkSolution};
 use crate::joints::JointVector;
 use crate::path::{JointPath, LineOptions};
 
-/// Whether a half turn of the hand about its own axis gives the same grasp.
+/// Whether a rotation of the hand by 180° about its own axis gives the same grasp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GraspSymmetry {
     /// Only the given pose is valid.
@@ -31,19 +31,21 @@ pub struct Approach {
     pub pregrasp: IkSolution,
     /// The line, from the pregrasp to the grasp.
     pub path: JointPath,
-    /// Whether the hand was turned by half a turn, see [`GraspSymmetry::HalfTurn`].
+    /// Whether the hand was rotated by 180°, see [`GraspSymmetry::HalfTurn`].
     pub half_turned: bool,
 }
 
-/// The same grasp with exchanged fingers: half a turn about the hand's own z axis.
+/// The same grasp with exchanged fingers: rotated by 180° about the hand's own z axis.
 pub fn with_fingers_exchanged(base_from_tcp: &Isometry3<f64>) -> Isometry3<f64> {
     base_from_tcp * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI)
 }
 
 impl ArmGeometry {
-    /// Finds the configuration of least cost at the pregrasp from which the straight line to the grasp can be followed.
+    /// Finds the configuration of lowest cost at the pregrasp from which the straight line to the grasp can be
+    /// followed.
     ///
-    /// Both poses in m in the base frame; both turned if `symmetry` allows it. `seed` as for [`ArmGeometry::inverse`].
+    /// Both poses are in m in the base frame; both are rotated by 180° if `symmetry` allows it and the cost is then
+    /// lower. `seed` is that of [`ArmGeometry::inverse`].
     ///
     /// # Errors
     /// If no approach exists, the reason of the best candidate; see [`ArmGeometry::inverse`] and
@@ -88,7 +90,7 @@ impl ArmGeometry {
                 }
             }
         }
-        // The error of a reachable pregrasp is more informative than that of an unreachable one.
+        // The error of a reachable pregrasp is more informative than the error of an unreachable one.
         Err(path_error
             .or(first_error)
             .expect("without a start there was an error, and a start gives an approach or an error"))

@@ -14,17 +14,17 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// From the ends' coordinates and the radius, m.
+    /// Creates a capsule from the coordinates of both ends and the radius, m.
     pub const fn new(from: [f64; 3], to: [f64; 3], radius_m: f64) -> Self {
         Self { from: Point3::new(from[0], from[1], from[2]), to: Point3::new(to[0], to[1], to[2]), radius_m }
     }
 
-    /// The same capsule in another frame.
+    /// The capsule in another frame.
     pub fn moved(&self, frame_from_body: &Isometry3<f64>) -> Self {
         Self { from: frame_from_body * self.from, to: frame_from_body * self.to, radius_m: self.radius_m }
     }
 
-    /// Middle of the segment.
+    /// Midpoint of the segment.
     pub fn middle(&self) -> Point3<f64> {
         nalgebra::center(&self.from, &self.to)
     }
@@ -43,18 +43,19 @@ impl Capsule {
     }
 }
 
-/// The closest points of two segments, as shares of their lengths.
+/// The closest points of two segments, as fractions of their lengths.
 ///
-/// `u` and `v` lead from the segments' starts to their ends, `w` from the second's start to the first's.
+/// `u` and `v` are the vectors from the segments' starts to their ends, `w` the vector from the second start to the
+/// first.
 ///
 /// # Source
-/// C. Ericson, *Real-Time Collision Detection*, 5.1.9; written without branches, so that it can be computed in lanes.
+/// C. Ericson, *Real-Time Collision Detection*, 5.1.9; without branches, so that it can be computed in lanes.
 #[inline(always)]
 pub(crate) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
-    /// Squared lengths below this belong to points, m².
+    /// A segment with a smaller squared length is a point, m².
     const POINT: f64 = 1e-18;
-    /// Segments whose angle has a smaller squared sine are parallel: any share of the first is valid, and the distance
-    /// is too large by at most a millionth of the longer one's length.
+    /// Two segments are parallel if the squared sine of their angle is smaller. Any fraction of the first is then
+    /// valid, and the distance is too large by at most a millionth of the longer segment's length.
     const PARALLEL: f64 = 1e-12;
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (uu, vv, uv, uw, vw) = (dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w));
@@ -85,7 +86,7 @@ mod tests {
     #[test]
     fn distances_that_can_be_computed_by_hand() {
         let along_x = Capsule::new([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 0.1);
-        // Crossing above, beside the end, parallel, touching, and a ball.
+        // Crossing above, beside the end, parallel, touching, and a sphere.
         for (other, expected) in [
             (Capsule::new([0.5, -1.0, 0.5], [0.5, 1.0, 0.5], 0.2), 0.2),
             (Capsule::new([1.3, 0.4, 0.0], [2.0, 0.4, 0.0], 0.1), 0.3),

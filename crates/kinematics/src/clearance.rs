@@ -17,14 +17,14 @@ pub struct Clearance {
     pub time_secs: f64,
 }
 
-/// Time between two checks, s: at most 5 mm of travel at 2 m/s.
+/// Time between two checks, s: the hand moves at most 5 mm at 2 m/s.
 const LOOK_SECS: f64 = 0.0025;
 
 impl ArmGeometry {
     /// The lowest point of hand, wrist and elbow above a level table at `table_height_m` in the base frame.
     ///
-    /// The hand is modelled as a box with open fingers, wrist and elbow as balls; the balls are slightly larger than
-    /// the links.
+    /// The hand is modelled as a box with open fingers, wrist and elbow as spheres that are slightly larger than the
+    /// links.
     pub fn clearance(&self, q: &JointVector, table_height_m: f64) -> Clearance {
         let frames = self.frames(q);
         let mut lowest = Clearance { lowest_m: f64::INFINITY, part: ArmPart::FingerTips, time_secs: 0.0 };
@@ -61,7 +61,7 @@ impl Trajectory {
                 Clearance { time_secs, ..arm.clearance(&q, table_height_m) }
             })
             .min_by(|a, b| a.lowest_m.total_cmp(&b.lowest_m))
-            .expect("there are at least two looks")
+            .expect("at least two times are checked")
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn in_the_ready_pose_the_finger_tips_are_lowest() {
-        // The tcp is at 0.4869 m with the hand level, see the forward kinematics.
+        // The tcp is at a height of 0.4869 m and the hand is level, as computed by forward kinematics.
         let clearance = ArmGeometry::panda().clearance(&ready_pose(), 0.1);
         assert_eq!(clearance.part, ArmPart::FingerTips);
         assert!((clearance.lowest_m - 0.3869).abs() < 1e-4);
@@ -96,8 +96,8 @@ mod tests {
 
     #[test]
     fn a_hand_lying_on_its_side_touches_with_its_body() {
-        // Joint 6 at 0: the hand points back, level, at 0.697 - 0.088 above the ground, see the forward kinematics; a quarter
-        // turn of joint 7 from the ready pose makes the hand's width of 0.204 m vertical.
+        // With joint 6 at 0, the hand points back horizontally at a height of 0.697 - 0.088, as computed by forward
+        // kinematics. With joint 7 at 90° from the ready pose, the hand's width of 0.204 m is vertical.
         let mut q = ready_pose();
         q[5] = 0.0;
         q[6] += std::f64::consts::FRAC_PI_2;
@@ -108,9 +108,9 @@ mod tests {
 
     #[test]
     fn a_motion_through_the_table_is_seen_in_the_middle() {
-        // Joint 6 swings the hand from back to front about the wrist centre at 0.6973 m. The lowest point is an edge of
-        // the finger tips, 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when it is vertically
-        // below.
+        // Joint 6 moves the hand from back to front about the wrist centre at 0.6973 m. The lowest point is an edge of
+        // the fingertips, at 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when the edge is
+        // vertically below the wrist centre.
         let panda = ArmGeometry::panda();
         let (mut start, mut end) = (ready_pose(), ready_pose());
         start[5] = 0.3;

@@ -1,4 +1,4 @@
-//! Errors, with the expected and the found value.
+//! The error type of this crate.
 
 use crate::ik::IkSolution;
 use crate::joints::LimitViolation;
@@ -8,7 +8,7 @@ use crate::joints::LimitViolation;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum KinematicsError {
-    /// An input holds NaN or an infinity.
+    /// An input contains NaN or infinity.
     #[error("{what} must be finite numbers, found {found}")]
     NotFinite { what: &'static str, found: String },
     /// A pose's quaternion is not of unit length.
@@ -25,7 +25,8 @@ pub enum KinematicsError {
     JointOutOfRange { what: &'static str, violation: LimitViolation },
     /// No configuration reaches the pose, even without joint limits.
     #[error(
-        "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the tcp misses it by {:.4} m and {:.2}° at best{}",
+        "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the nearest reachable tcp pose is {:.4} m and {:.2}° \
+         away{}",
         .target_m[0], .target_m[1], .target_m[2],
         .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees(),
         list_joints(.nearest_at_limit)
@@ -33,32 +34,32 @@ pub enum KinematicsError {
     OutOfReach {
         /// The requested tcp position, base frame, m.
         target_m: [f64; 3],
-        /// The nearest pose that the arm reaches within its limits, and its error.
+        /// The nearest pose that the arm reaches within its limits, with its error.
         nearest: Box<IkSolution>,
-        /// Joints (1 to 7) at a limit there.
+        /// Joints (1 to 7) that are at a limit in the nearest pose.
         nearest_at_limit: Vec<usize>,
     },
     /// Configurations reach the pose, but each of them violates a joint limit.
     #[error(
         "a joint limit forbids the pose: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]; \
-         within the limits the tcp misses by {:.4} m and {:.2}°",
+         within the limits, the nearest tcp pose is {:.4} m and {:.2}° away",
         .violation.joint, .violation.found_rad.to_degrees(), .violation.min_rad.to_degrees(), .violation.max_rad.to_degrees(),
         .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees()
     )]
     JointLimit {
         /// The violated limit of the configuration with the smallest violation.
         violation: LimitViolation,
-        /// The nearest pose that the arm reaches within its limits, and its error.
+        /// The nearest pose that the arm reaches within its limits, with its error.
         nearest: Box<IkSolution>,
     },
     /// A straight path reaches a joint limit.
     #[error(
-        "the straight path meets a joint limit {:.1} % along: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]",
+        "the straight path reaches a joint limit after {:.1} %: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]",
         .at_share * 100.0, .violation.joint, .violation.found_rad.to_degrees(), .violation.min_rad.to_degrees(),
         .violation.max_rad.to_degrees()
     )]
     PathJointLimit {
-        /// Share of the path before it, 0 to 1.
+        /// Fraction of the path that was followed, 0 to 1.
         at_share: f64,
         violation: LimitViolation,
     },
@@ -67,12 +68,12 @@ pub enum KinematicsError {
         "the straight path cannot be followed beyond {:.1} %: {reason}", .at_share * 100.0
     )]
     PathBlocked {
-        /// Share of the path before it, 0 to 1.
+        /// Fraction of the path that was followed, 0 to 1.
         at_share: f64,
         /// The reason why there is no solution.
         reason: &'static str,
     },
-    /// The trajectory generator refused its input or failed.
+    /// The trajectory generator rejected its input or failed.
     #[error("no trajectory within the limits: {reason}")]
     Trajectory { reason: String },
 }

@@ -1,12 +1,13 @@
 //! An arm's geometry as data, with forward kinematics and Jacobian.
 //!
-//! Modified (Craig) Denavit–Hartenberg convention: frame *i* is turned by `q[i]` about its own z axis, and
+//! Modified (Craig) Denavit–Hartenberg convention: frame *i* is rotated by `q[i]` about its own z axis, and
 //! `link(i-1)_from_link(i) = RotX(alpha) · TransX(a) · RotZ(q) · TransZ(d)`.
 //!
-//! Frames: `base` (z up, x forward), `link 1..7` (on the joint axes), `flange` (along z of link 7), `hand` (the flange turned about z),
-//! `tcp` (along z of the hand, between the finger tips). The fingers open along y of `hand` and `tcp`; z points out of the hand.
+//! Frames: `base` (z up, x forward), `link 1..7` (on the joint axes), `flange` (along z of link 7), `hand` (the flange
+//! rotated about z), `tcp` (along z of the hand, between the fingertips). The fingers open along y of `hand` and `tcp`;
+//! z points out of the hand.
 //!
-//! Bodies of the arm are numbered: 0 the base, 1 to 7 the links, 8 the hand with its fingers, 9 the held part.
+//! Bodies of the arm are numbered: 0 is the base, 1 to 7 the links, 8 the hand with its fingers, 9 the held part.
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3};
 
@@ -25,19 +26,19 @@ pub struct DhJoint {
     pub a_m: f64,
     /// `d`, m.
     pub d_m: f64,
-    /// `alpha`, rad: 0 or a quarter turn in either direction.
+    /// `alpha`, rad: 0 or ±π/2.
     pub alpha_rad: f64,
 }
 
-/// The data of an arm with its hand for kinematics, collisions and dynamics. Another arm is another value, see
-/// [`ArmGeometry::arm`] and [`ArmGeometry::fr3`].
+/// The data of an arm with its hand for kinematics, collisions and dynamics. Another arm is another value of this type,
+/// see [`ArmGeometry::arm`] and [`ArmGeometry::fr3`].
 ///
-/// An arm of fewer joints has the range from 0 to 0 for the last ones, whose columns of the Jacobian are zero.
+/// An arm with fewer joints has the range from 0 to 0 for its last joints, whose columns of the Jacobian are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmGeometry {
-    /// The joints, joint 1 (at the base) first.
+    /// The joints, from joint 1 at the base.
     pub joints: [DhJoint; NUM_JOINTS],
-    /// Link 7 to flange along z, m.
+    /// Distance from link 7 to the flange along z, m.
     pub flange_offset_m: f64,
     /// The joint limits that inverse kinematics and paths respect.
     pub limits: JointLimits,
@@ -45,17 +46,18 @@ pub struct ArmGeometry {
     pub cartesian_limits: CartesianLimits,
     /// The posture that inverse kinematics prefers, rad.
     pub ready: JointVector,
-    /// The closed form of the inverse kinematics, for arms that have one; others are solved by descent from many starts.
+    /// The closed form of the inverse kinematics, if the arm has one; otherwise it is solved by descent from many
+    /// starts.
     pub closed_form: Option<ClosedForm>,
     /// The hand on the flange.
     pub hand: HandGeometry,
-    /// Capsules that contain base and links 1 to 7, each in the base's or the link's frame.
+    /// Capsules that contain base and links 1 to 7, each in the frame of the base or the link.
     pub capsules: [Vec<Capsule>; NUM_JOINTS + 1],
-    /// The same, fewer and wider: for a check in every cycle of a motion.
+    /// Fewer and wider capsules than `capsules`, for a check in every cycle of a motion.
     pub wide_capsules: [Vec<Capsule>; NUM_JOINTS + 1],
-    /// Pairs of bodies that can collide, the one closer to the base first. Neighbours touch by construction.
+    /// Pairs of bodies that can collide, the one nearer to the base first. Neighbours always touch.
     pub self_pairs: Vec<(usize, usize)>,
-    /// Balls around links' origins that contain wrist and elbow: part, number of the link, radius in m.
+    /// Spheres around links' origins that contain wrist and elbow: part, number of the link, radius in m.
     pub balls: Vec<(ArmPart, usize, f64)>,
     /// Links 1 to 7 without the hand, in their frames.
     pub links: [LinkInertia; NUM_JOINTS],
@@ -65,7 +67,7 @@ pub struct ArmGeometry {
     pub damping: JointVector,
 }
 
-/// A method to compute all configurations of a pose for a given angle of joint 7.
+/// A method that computes all configurations for a pose and a given angle of joint 7.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClosedForm {
     /// Franka's arms: three axes meet in the shoulder, two in the wrist, and joint 7 is offset from them.
@@ -75,9 +77,9 @@ pub enum ClosedForm {
 /// A hand with two parallel fingers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandGeometry {
-    /// Turn of the hand relative to the flange, about z.
+    /// Rotation of the hand relative to the flange, about z.
     pub flange_from_hand: UnitQuaternion<f64>,
-    /// Flange to tcp along z, m.
+    /// Distance from the flange to the tcp along z, m.
     pub tcp_offset_m: f64,
     /// Largest opening between the fingers, m.
     pub opening_max_m: f64,
@@ -89,7 +91,7 @@ pub struct HandGeometry {
     pub length_m: f64,
     /// Capsules that contain the hand's body and a small camera on it, in the hand's frame.
     pub capsules: Vec<Capsule>,
-    /// The same with fingers at any opening, fewer and wider, see [`ArmGeometry::wide_capsules`].
+    /// Fewer and wider capsules that also contain the fingers at any opening, see [`ArmGeometry::wide_capsules`].
     pub wide_capsules: Vec<Capsule>,
     /// A finger.
     pub finger: FingerGeometry,
@@ -100,30 +102,30 @@ pub struct HandGeometry {
 /// A finger of a hand, in the hand's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FingerGeometry {
-    /// Half the width across its motion, m.
+    /// Half of the width across the finger's motion, m.
     pub half_width_m: f64,
-    /// Thickness of its tip along its motion, m.
+    /// Thickness of the tip along the finger's motion, m.
     pub thickness_m: f64,
-    /// Half of its thickness along its motion at the root: its middle's distance from the pad's face, m.
+    /// Half of the thickness along the finger's motion at the root: the distance of its centre from the pad's face, m.
     pub middle_m: f64,
-    /// Capsules along z that contain it, from root to tip.
+    /// Capsules along z that contain the finger, from root to tip.
     pub capsules: Vec<FingerCapsule>,
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass: its distance from the pad's face and its z, m.
+    /// Centre of mass: distance from the pad's face, and z, m.
     pub center_m: [f64; 2],
-    /// Diagonal of its inertia, kg·m².
+    /// Diagonal of the inertia, kg·m².
     pub inertia: [f64; 3],
 }
 
 /// A capsule of a finger, parallel to z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FingerCapsule {
-    /// Distance by which it is closer to the pad than the finger's centre, m.
+    /// Distance by which the capsule is closer to the pad than the finger's centre, m.
     pub inward_m: f64,
-    /// The ends of its axis along z, m.
+    /// The ends of the axis along z, m.
     pub z_m: [f64; 2],
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
 }
 
@@ -140,26 +142,26 @@ pub enum ArmPart {
     Elbow,
 }
 
-/// Every frame of the arm at one configuration, in the base frame.
+/// All frames of the arm at one configuration, in the base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
-    /// Links 1 to 7, link 1 first.
+    /// Links 1 to 7, from link 1.
     pub base_from_link: [Isometry3<f64>; NUM_JOINTS],
     /// The flange.
     pub base_from_flange: Isometry3<f64>,
     /// The hand.
     pub base_from_hand: Isometry3<f64>,
-    /// The tool centre point between the finger tips.
+    /// The tool centre point between the fingertips.
     pub base_from_tcp: Isometry3<f64>,
 }
 
 impl ArmGeometry {
-    /// The tcp relative to the flange: constant.
+    /// The constant pose of the tcp relative to the flange.
     pub fn flange_from_tcp(&self) -> Isometry3<f64> {
         self.hand.flange_from_hand * Translation3::new(0.0, 0.0, self.hand.tcp_offset_m)
     }
 
-    /// The hand relative to the last link: constant.
+    /// The constant pose of the hand relative to the last link.
     pub(crate) fn link7_from_hand(&self) -> Isometry3<f64> {
         Isometry3::from_parts(Translation3::new(0.0, 0.0, self.flange_offset_m), self.hand.flange_from_hand)
     }
@@ -226,7 +228,7 @@ impl ArmGeometry {
 
 impl DhJoint {
     fn parent_from_link(&self, q: f64) -> Isometry3<f64> {
-        // RotX(alpha)·TransX(a)·RotZ(q)·TransZ(d): the quaternion is the product of the two turns.
+        // RotX(alpha)·TransX(a)·RotZ(q)·TransZ(d): the quaternion is the product of the two rotations.
         let (sin_half_a, cos_half_a) = (self.alpha_rad * 0.5).sin_cos();
         let (sin_half_q, cos_half_q) = (q * 0.5).sin_cos();
         let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(
@@ -240,14 +242,14 @@ impl DhJoint {
         Isometry3::from_parts(translation, rotation)
     }
 
-    /// Sine and cosine of alpha, without the rounding of a quarter turn.
+    /// Sine and cosine of alpha, without rounding errors at ±π/2.
     #[inline(always)]
     pub(crate) fn twist(&self) -> (f64, f64) {
         if self.alpha_rad == 0.0 { (0.0, 1.0) } else { (self.alpha_rad.signum(), 0.0) }
     }
 }
 
-/// The twist in the base frame that moves `from` to `to` in unit time: rows 0–2 metres, rows 3–5 radians.
+/// The twist in the base frame that moves `from` to `to` in unit time: rows 0–2 in metres, rows 3–5 in radians.
 pub(crate) fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> nalgebra::Vector6<f64> {
     let linear = to.translation.vector - from.translation.vector;
     let angular = (to.rotation * from.rotation.inverse()).scaled_axis();
@@ -272,7 +274,7 @@ mod tests {
         assert!((z + Vector3::z()).norm() < 1e-12);
         let tcp = frames.base_from_tcp.translation.vector;
         assert!((tcp - Vector3::new(0.088, 0.0, 0.8226)).norm() < 1e-12);
-        // The hand is turned by -π/4 about a z that points down: its x axis is at +π/4 seen from above.
+        // The hand is rotated by -π/4 about a z axis that points down: its x axis is at +π/4 seen from above.
         let x = frames.base_from_hand.rotation * Vector3::x();
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         assert!((x - Vector3::new(diagonal, diagonal, 0.0)).norm() < 1e-12);
@@ -281,8 +283,9 @@ mod tests {
     #[test]
     fn the_ready_pose_is_where_franka_has_it() {
         let base_from_tcp = ArmGeometry::panda().forward(&ready_pose());
-        // In the plane y = 0, from the base: shoulder at height 0.333; upper arm leaning back by 45°, so (-s, s) along it
-        // and (s, s) across; forearm level, its offset of 0.0825 upwards; 0.088 forward; flange and tcp straight down.
+        // In the plane y = 0, from the base: the shoulder is at a height of 0.333; the upper arm leans back by 45°, so
+        // it is along (-s, s) and its offset along (s, s); the forearm is level, with its offset of 0.0825 upwards;
+        // then 0.088 forward; flange and tcp are straight down.
         let s = std::f64::consts::FRAC_1_SQRT_2;
         let x = -0.316 * s + 0.0825 * s + 0.384 + 0.088;
         let z = 0.333 + 0.316 * s + 0.0825 * s + 0.0825 - 0.107 - 0.1034;
@@ -308,7 +311,7 @@ mod tests {
 
     #[test]
     fn the_jacobian_agrees_with_finite_differences() {
-        // Central differences at 1e-6 rad of lengths below 1 m have an error of about 1e-9.
+        // Central differences with a step of 1e-6 rad have an error of about 1e-9 for lengths below 1 m.
         const STEP_RAD: f64 = 1e-6;
         const TOLERANCE: f64 = 2e-8;
         let panda = ArmGeometry::panda();

@@ -6,30 +6,30 @@ use crate::joints::JointVector;
 
 /// Preferences of [`ArmGeometry::inverse`](crate::ArmGeometry::inverse) among the configurations that reach a pose.
 ///
-/// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
-/// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
+/// The cost is `seed_weight · |q - seed|² + posture_weight · |q - posture|² + limit_weight · Σ max(0, 1 - margin /
+/// comfortable_margin_rad)²`, with angles in rad.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct IkOptions {
-    /// Weight of the distance to the seed configuration: short motions.
+    /// Weight of the distance to the seed configuration; it favours short motions.
     pub seed_weight: f64,
-    /// The preferred posture, rad; `None` for the arm's own.
+    /// The preferred posture, rad; `None` for the arm's ready posture.
     pub posture: Option<JointVector>,
     /// Weight of the distance to the preferred posture.
     pub posture_weight: f64,
     /// Weight of closeness to joint limits.
     pub limit_weight: f64,
-    /// Joints closer than this to one of their limits add to the cost, rad.
+    /// Distance from a limit below which a joint adds to the cost, rad.
     pub comfortable_margin_rad: f64,
-    /// Joint positions must keep this distance from the limits, rad.
+    /// Minimum distance of joint positions from their limits, rad.
     pub required_margin_rad: f64,
-    /// Number of tried angles of joint 7, at least 2.
+    /// Number of angles of joint 7 that are tried, at least 2.
     pub num_redundancy_samples: usize,
     /// Tolerance of the position, m.
     pub position_tolerance_m: f64,
     /// Tolerance of the orientation, rad.
     pub angle_tolerance_rad: f64,
-    /// Length in metres that counts as much as a radian when the nearest pose of an unreachable one is searched.
+    /// Length in metres that counts as much as a radian in the search for the nearest pose of an unreachable one.
     pub metres_per_rad: f64,
 }
 
@@ -61,8 +61,8 @@ pub struct IkSolution {
     pub position_residual_m: f64,
     /// Angle between the reached and the requested orientation, rad.
     pub angle_residual_rad: f64,
-    /// Distance of the joint closest to one of its limits, rad.
+    /// Smallest distance of a joint from one of its limits, rad.
     pub limit_margin_rad: f64,
-    /// The cost of [`IkOptions`]; lower is better.
+    /// The cost as in [`IkOptions`]; lower is better.
     pub cost: f64,
 }

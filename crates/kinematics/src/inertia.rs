@@ -2,14 +2,14 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-/// A rigid body in the frame of the link that it belongs to.
+/// A rigid body in the frame of the link to which it belongs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkInertia {
     /// Mass, kg.
     mass_kg: f64,
     /// Centre of mass, m.
     center_m: Vector3<f64>,
-    /// Inertia about the centre of mass, axes as the link's, kg·m².
+    /// Inertia about the centre of mass, in the link's axes, kg·m².
     inertia: Matrix3<f64>,
 }
 
@@ -19,7 +19,7 @@ impl LinkInertia {
         Self { mass_kg, center_m: center_m.into(), inertia: Matrix3::from_diagonal(&diagonal.into()) }
     }
 
-    /// Fixes another body to this one.
+    /// Adds another body that is fixed to this one.
     pub(crate) fn add(&mut self, other: &Self, self_from_other: &Isometry3<f64>) {
         let turn = self_from_other.rotation.to_rotation_matrix();
         let center_m = (self_from_other * nalgebra::Point3::from(other.center_m)).coords;
@@ -36,8 +36,8 @@ impl LinkInertia {
         (self.mass_kg, self.center_m) = (mass_kg, middle);
     }
 
-    /// Force (N) and torque about the link's origin (N·m) for a motion of the body: the origin's acceleration, the
-    /// angular velocity and its rate, all in the link's axes.
+    /// Force (N) and torque about the link's origin (N·m) for a motion of the body. The motion is the origin's
+    /// acceleration, the angular velocity and its rate, all in the link's axes.
     pub(crate) fn force_and_torque(
         &self,
         acceleration: &Vector3<f64>,
@@ -51,7 +51,7 @@ impl LinkInertia {
     }
 }
 
-/// Inertia of a point mass about an origin at this distance.
+/// Inertia of a point mass at this distance from an origin.
 fn point_inertia(mass_kg: f64, away_m: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * away_m.norm_squared() - away_m * away_m.transpose()) * mass_kg
 }

@@ -1,14 +1,14 @@
 //! Inverse kinematics: the best configuration that reaches a tcp pose within the joint limits.
 //!
 //! A Franka has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
-//! configuration; those inside the limits are compared by [`IkOptions`]' cost, and the best is refined over q7. So the
-//! search covers all branches of solutions, needs no random restarts and is deterministic. If the grid finds nothing,
-//! the branches with the smallest limit violations are refined over q7, which finds poses that only a narrow range of
-//! angles reaches; if that fails as well, damped least squares within the limits gives the nearest pose and the error
-//! names the reason.
+//! configuration; those inside the limits are compared by the cost of [`IkOptions`], and the best is refined over q7.
+//! The search therefore covers all branches of solutions, needs no random restarts and is deterministic. If the grid
+//! has no solution, the branches with the smallest limit violations are refined over q7, which finds poses that are
+//! reached only in a narrow range of angles. If that also fails, damped least squares within the limits gives the
+//! nearest pose, and the error names the reason.
 //!
-//! An arm without a closed form is solved by damped least squares from a fixed set of many starts: this is slower, and
-//! only the redundant joint's angles to which the starts lead are compared.
+//! An arm without a closed form is solved by damped least squares from a fixed set of many starts. This is slower, and
+//! compares only the angles of the redundant joint to which the starts lead.
 
 use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
@@ -24,14 +24,14 @@ use crate::limits::JointLimits;
 use crate::nearest::descend;
 
 impl ArmGeometry {
-    /// Finds the configuration that reaches `base_from_tcp` at the least cost of `options`.
+    /// Finds the configuration of lowest cost that reaches `base_from_tcp`; `options` define the cost.
     ///
     /// # Units and frames
-    /// `base_from_tcp` in m in the base frame; `seed` in rad, usually the present configuration; it need not be inside the
-    /// limits.
+    /// `base_from_tcp` in m in the base frame; `seed` in rad, usually the current configuration, which need not be
+    /// inside the limits.
     ///
     /// # Errors
-    /// [`KinematicsError::OutOfReach`] and [`KinematicsError::JointLimit`] carry the nearest pose;
+    /// [`KinematicsError::OutOfReach`] and [`KinematicsError::JointLimit`] contain the nearest pose;
     /// [`KinematicsError::NotFinite`], [`KinematicsError::NotARotation`] and [`KinematicsError::InvalidOption`] for
     /// invalid input.
     pub fn inverse(
@@ -58,7 +58,7 @@ impl ArmGeometry {
     /// For a caller with further conditions, such as a straight path that starts there.
     ///
     /// # Errors
-    /// As [`ArmGeometry::inverse`]; the list is never empty.
+    /// The errors of [`ArmGeometry::inverse`]; the list is never empty.
     pub fn inverse_all(
         &self,
         base_from_tcp: &Isometry3<f64>,
@@ -79,7 +79,7 @@ impl ArmGeometry {
     }
 }
 
-/// The best grid point of one interval of q7 in which one branch stays inside the limits.
+/// The best grid point of one interval of q7 in which a branch stays inside the limits.
 #[derive(Debug, Clone, Copy)]
 struct Branch {
     branch_idx: usize,
@@ -96,22 +96,21 @@ struct Search<'a> {
     posture: JointVector,
     limits: JointLimits,
     options: &'a IkOptions,
-    /// Tried angles of joint 7, ascending.
+    /// The angles of joint 7 that are tried, in ascending order.
     grid: Vec<f64>,
 }
 
-/// Violations this small are rounding errors and are clamped.
+/// Limit violations up to this size are rounding errors and are clamped, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Weight of geometric infeasibility relative to radians beyond limits in the search for the solution with the smallest
-/// violation.
+/// Weight of geometric infeasibility relative to radians beyond limits in the search for the smallest violation.
 const INFEASIBILITY_RAD: f64 = 10.0;
 const NUM_REFINEMENTS: usize = 24;
 const NUM_BISECTIONS: usize = 12;
-/// Number of branches tried if nothing on the grid is feasible.
+/// Number of branches that are tried if no grid point is feasible.
 const NUM_RESCUES: usize = 8;
-/// Number of random starts for an arm without a closed form; of configurations closer together than this (rad) only the
-/// best is kept.
+/// Number of random starts for an arm without a closed form.
 const NUM_STARTS: usize = 60;
+/// Of configurations closer together than this, only the best is kept, rad.
 const MIN_APART_RAD: f64 = 0.1;
 
 impl<'a> Search<'a> {
@@ -194,7 +193,7 @@ impl<'a> Search<'a> {
             + options.limit_weight * crowding
     }
 
-    /// Minimises a branch's cost over q7 between the neighbouring grid points, as far as the branch is feasible.
+    /// Minimises a branch's cost over q7 between the neighbouring grid points, where the branch is feasible.
     fn refine(&self, branch: Branch) -> JointVector {
         let cost_at = |q7: f64| {
             self.feasible_cost(&self.analytic_solutions(q7)[branch.branch_idx]).unwrap_or((branch.q, f64::INFINITY))
@@ -220,7 +219,7 @@ impl<'a> Search<'a> {
         if cost < branch.cost { q } else { branch.q }
     }
 
-    /// The neighbouring grid points of one, or itself at the ends of the grid.
+    /// The neighbours of a grid point, or the point itself at the ends of the grid.
     fn neighbours(&self, grid_idx: usize) -> (f64, f64) {
         let last = self.grid.len() - 1;
         (self.grid[grid_idx.saturating_sub(1)], self.grid[(grid_idx + 1).min(last)])
@@ -240,7 +239,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The solution at `q`, refined where the closed form lost digits, if it meets the tolerances.
+    /// The solution at `q`, refined if the closed form lost digits, if it is within the tolerances.
     fn accept(&self, q: &JointVector) -> Option<IkSolution> {
         let solution = self.solution(q);
         if self.meets(&solution) {
@@ -287,7 +286,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Of solutions that miss the pose the one with the smallest error.
+    /// The solution with the smallest error among those that miss the pose.
     fn nearest(&self, missed: impl Iterator<Item = IkSolution>) -> IkSolution {
         let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
         missed.min_by(|a, b| miss(a).total_cmp(&miss(b))).expect("the seed is always a start")
@@ -327,13 +326,13 @@ impl<'a> Search<'a> {
         Ok(apart)
     }
 
-    /// The violation of limits and geometry by a solution: 0 for a valid solution.
+    /// The violation of limits and geometry by a solution; 0 for a valid one.
     fn violation(&self, solution: &AnalyticSolution) -> f64 {
         let beyond: f64 = self.limits.margins(&solution.q).iter().map(|m| (-m).max(0.0)).sum();
         beyond + INFEASIBILITY_RAD * solution.infeasibility
     }
 
-    /// The local minima over q7 of each branch's violation, refined, smallest first.
+    /// The local minima over q7 of each branch's violation, refined, the smallest first.
     fn least_infeasible_solutions(&self) -> Vec<AnalyticSolution> {
         let on_grid: Vec<_> = self.grid.iter().map(|q7| self.analytic_solutions(*q7)).collect();
         let mut minima = Vec::new();
@@ -369,7 +368,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The lowest value found of `f` on [low, high] and the result with it, by golden-section search.
+/// The lowest value found of `f` on [low, high], and the result for it, by golden-section search.
 fn golden_section<T>(mut low: f64, mut high: f64, f: impl Fn(f64) -> (T, f64)) -> (T, f64) {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     let mut left = high - SHARE * (high - low);

@@ -1,11 +1,11 @@
-//! Joint positions of the arm: their type, Franka's ready pose, and a position outside its range.
+//! Joint positions of the arm: their type, Franka's ready pose, and positions outside their range.
 
 use nalgebra::SVector;
 
 /// Number of joints of the arm.
 pub const NUM_JOINTS: usize = 7;
 
-/// One number per joint, joint 1 (at the base) first; radians unless stated otherwise.
+/// One number for each joint, from joint 1 at the base; radians unless stated otherwise.
 pub type JointVector = SVector<f64, NUM_JOINTS>;
 
 /// Franka's ready pose, rad: elbow up, hand pointing down in front of the base.
@@ -22,7 +22,7 @@ pub fn ready_pose() -> JointVector {
 /// A joint position outside its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitViolation {
-    /// Joint number as Franka counts, 1 to 7.
+    /// Joint number from 1 to 7, as Franka counts.
     pub joint: usize,
     /// The requested position, rad.
     pub found_rad: f64,
@@ -33,7 +33,7 @@ pub struct LimitViolation {
 }
 
 impl LimitViolation {
-    /// Distance of the joint outside its range, rad, positive.
+    /// Distance of the position from its range, rad, positive.
     pub fn excess_rad(&self) -> f64 {
         (self.min_rad - self.found_rad).max(self.found_rad - self.max_rad)
     }

@@ -1,5 +1,5 @@
-//! An arm: the pose of its hand, configurations for a pose, and motions within its limits. Its geometry is data:
-//! [`ArmGeometry::panda`], [`ArmGeometry::fr3`].
+//! Kinematics of an arm: the pose of its hand, configurations for a pose, and motions within its limits. The geometry
+//! is data: [`ArmGeometry::panda`], [`ArmGeometry::fr3`].
 //!
 //! ```text
 //! base_from_tcp ──► inverse ──► q ──► point-to-point trajectory ─┐
@@ -10,7 +10,7 @@
 //! [`collision`] checks contacts of the arm, [`planning`] finds motions around obstacles, [`dynamics`] computes the
 //! torques of a motion.
 //!
-//! Communication with a real robot is elsewhere.
+//! Not in this crate: communication with a real robot.
 //!
 //! ```
 //! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -66,7 +66,7 @@ pub use path::{JointPath, LineOptions, PathPoint};
 pub use rounded_path::RoundedPath;
 pub use trajectory::Trajectory;
 
-/// The README's example, which runs with the other examples.
+/// Runs the README's example with the other doc tests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -3,7 +3,7 @@
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, LimitViolation};
 
-/// Limits of every joint.
+/// Limits of all joints.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct JointLimits {
@@ -22,7 +22,7 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
-    /// The same ranges with velocity, acceleration and jerk multiplied by the given factors.
+    /// The same position ranges, with velocity, acceleration and jerk multiplied by the given factors.
     ///
     /// # Errors
     /// A factor outside (0, 1] is a [`KinematicsError::InvalidOption`].
@@ -57,7 +57,7 @@ impl JointLimits {
         (self.position_min + self.position_max) * 0.5
     }
 
-    /// Whether these angles, given in degrees, violate the limits although the same numbers in radians would not.
+    /// Whether these angles, given in degrees, violate the limits, but their numbers taken as radians do not.
     pub fn are_radians_given_as_degrees(&self, q: &JointVector) -> bool {
         self.worst_violation(q, 0.0).is_some() && self.worst_violation(&q.map(f64::to_degrees), 0.0).is_none()
     }
@@ -91,7 +91,7 @@ pub struct CartesianLimits {
 }
 
 impl CartesianLimits {
-    /// The same limits multiplied by the given factors, both linear and angular.
+    /// The limits multiplied by the given factors, linear and angular alike.
     ///
     /// # Errors
     /// A factor outside (0, 1] is a [`KinematicsError::InvalidOption`].

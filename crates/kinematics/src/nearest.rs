@@ -1,4 +1,4 @@
-//! The configuration within the joint limits whose tcp is closest to a pose: damped least squares in a box.
+//! The configuration within the joint limits whose tcp is nearest to a pose, by damped least squares with bounds.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -10,14 +10,14 @@ const MAX_ITERATIONS: usize = 300;
 const INITIAL_DAMPING: f64 = 1e-3;
 const MIN_DAMPING: f64 = 1e-12;
 const MAX_DAMPING: f64 = 1e6;
-/// The descent ends when a step gains less than this share of the cost.
+/// Relative decrease of the cost below which the descent ends.
 const MIN_RELATIVE_GAIN: f64 = 1e-10;
 const NEGLIGIBLE_COST: f64 = 1e-26;
 
 /// Levenberg–Marquardt from `start`; projection keeps the joints inside `limits`.
 ///
 /// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit whose step points outwards is left out
-/// of the step, so that the others move along the limit instead of stopping there.
+/// of the step, so that the other joints continue along the limit.
 pub(crate) fn descend(
     arm: &ArmGeometry,
     limits: &JointLimits,
@@ -91,7 +91,7 @@ fn damped_step(
     }
     match matrix.cholesky() {
         Some(factor) => factor.solve(&right),
-        // Positive definite up to rounding: a gradient step is always downhill.
+        // The matrix is positive definite except for rounding errors; a gradient step always decreases the cost.
         None => right / (damping + normal.trace()),
     }
 }
@@ -118,8 +118,8 @@ mod tests {
         let q = descend(&panda, &panda.limits, &target, &ready_pose().add_scalar(0.2), 0.3);
         assert_eq!(panda.limits.worst_violation(&q, 0.0), None);
         assert_eq!(q[3], panda.limits.position_min[3]);
-        // It ends where no joint can lower the cost by a small move inside the limits: the others did not stop with
-        // joint 4.
+        // At the result, no joint can lower the cost by a small move inside the limits: joint 4 at its limit did not
+        // stop the other joints.
         let cost = |q: &JointVector| {
             let error = pose_error(&panda.forward(q), &target);
             error.fixed_rows::<3>(0).norm_squared() + 0.09 * error.fixed_rows::<3>(3).norm_squared()

@@ -1,12 +1,13 @@
 //! Straight Cartesian paths as smooth joint paths.
 //!
-//! The tcp's position runs along a line and its orientation turns about one fixed axis (slerp), both linear in the path
-//! parameter `s`. Joints follow by integrating the differential equation `dq/ds = J⁺ dx/ds - gain · (I - J⁺J) ∇H(q)`,
-//! which has smooth solutions, unlike inverse kinematics at each waypoint; the second term moves the elbow away from
-//! joint limits without moving the tcp (H: sum of fourth powers of the joints' positions in their ranges). Each step is
-//! corrected by Newton iterations on the pose itself, so that there is no drift.
+//! The tcp's position moves along a line and its orientation rotates about one fixed axis (slerp), both linear in the
+//! path parameter `s`. The joints follow the differential equation `dq/ds = J⁺ dx/ds - gain · (I - J⁺J) ∇H(q)`, whose
+//! solutions are smooth, unlike inverse kinematics at each waypoint. The second term moves the elbow away from joint
+//! limits without moving the tcp (H: sum of fourth powers of the joints' positions in their ranges). Each step is
+//! corrected by Newton iterations on the pose itself, which prevents drift.
 //!
-//! `s` is a length: metres of the line, or radians of the turn times [`LineOptions::metres_per_rad`] if that is more.
+//! `s` is a length: metres of the line, or radians of the rotation times [`LineOptions::metres_per_rad`] if that is
+//! more.
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -21,11 +22,11 @@ use crate::joints::{JointVector, NUM_JOINTS};
 pub struct LineOptions {
     /// Distance between waypoints in `s`, m.
     pub step_m: f64,
-    /// Length in `s` that counts as much as a radian of turning, m.
+    /// Length in `s` that counts as much as a radian of rotation, m.
     pub metres_per_rad: f64,
     /// Strength of the elbow's motion away from joint limits, rad² per m; 0 disables it.
     pub limit_avoidance: f64,
-    /// Largest turn of the joints per metre of `s`; more means that a singularity is close, rad/m.
+    /// Maximum angle of the joints per metre of `s`, rad/m; a larger one means that a singularity is near.
     pub max_rate_rad_m: f64,
 }
 
@@ -35,8 +36,8 @@ impl Default for LineOptions {
     }
 }
 
-/// A point of a path: the configuration and its derivatives by the path's parameter `s`, which is in m on a [`JointPath`] (the units below) and
-/// in s on a [`crate::RoundedPath`].
+/// A point of a path: the configuration and its derivatives with respect to the path's parameter `s`. On a
+/// [`JointPath`] `s` is in m, as in the units below; on a [`crate::RoundedPath`] it is in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
     /// Joint positions, rad.
@@ -93,7 +94,7 @@ impl Line {
         )
     }
 
-    /// Velocity of the tcp per metre of `s`, constant along the line.
+    /// Velocity of the tcp per metre of `s`, which is constant along the line.
     fn twist(&self) -> Vector6<f64> {
         let mut twist = Vector6::zeros();
         twist.fixed_rows_mut::<3>(0).copy_from(&self.translation);
@@ -108,12 +109,12 @@ impl JointPath {
         self.line.length_m
     }
 
-    /// Distance of the tcp's motion, m.
+    /// Distance that the tcp moves, m.
     pub fn distance_m(&self) -> f64 {
         self.line.translation.norm()
     }
 
-    /// Angle of the tcp's rotation, rad.
+    /// Angle by which the tcp rotates, rad.
     pub fn angle_rad(&self) -> f64 {
         self.line.turn.norm()
     }
@@ -128,7 +129,7 @@ impl JointPath {
         &self.knots[self.knots.len() - 1].q
     }
 
-    /// The pose of the tcp at `s` on the exact line.
+    /// The pose of the tcp at `s`, exactly on the line.
     pub fn base_from_tcp(&self, s: f64) -> Isometry3<f64> {
         if self.line.length_m == 0.0 {
             return self.line.base_from_start;
@@ -136,12 +137,12 @@ impl JointPath {
         self.line.at(s.clamp(0.0, self.line.length_m))
     }
 
-    /// The waypoints, evenly spaced in `s`, start and end included.
+    /// The waypoints, evenly spaced in `s`, with start and end.
     pub fn waypoints(&self) -> impl ExactSizeIterator<Item = &JointVector> {
         self.knots.iter().map(|knot| &knot.q)
     }
 
-    /// The configuration and its derivatives at `s`, clamped to the path.
+    /// The configuration and its derivatives at `s`, which is clamped to the path.
     pub fn at(&self, s: f64) -> PathPoint {
         let num_pieces = self.knots.len() - 1;
         if num_pieces == 0 {
@@ -160,9 +161,8 @@ impl ArmGeometry {
     /// # Units and frames
     /// `start` in rad, inside the limits; the end pose in m in the base frame.
     ///
-    /// # Errors
-    /// [`KinematicsError::PathJointLimit`] if a joint would leave its range, [`KinematicsError::PathBlocked`]
-    /// at a singularity or if the arm is too short; both give the position along the path.
+    /// # Errors [`KinematicsError::PathJointLimit`] if a joint would leave its range; [`KinematicsError::PathBlocked`]
+    /// at a singularity or if the arm is too short. Both contain the position along the path.
     pub fn straight_path(
         &self,
         start: &JointVector,
@@ -213,9 +213,9 @@ impl ArmGeometry {
 
 /// Positions this far beyond a limit are rounding errors.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Shorter lines count as no motion.
+/// A line shorter than this is no motion.
 const MIN_LENGTH_M: f64 = 1e-9;
-/// The five-point formula of the second derivative needs this many.
+/// Minimum number of pieces: the five-point formula of the second derivative needs this many.
 const MIN_PIECES: usize = 8;
 const MAX_PIECES: usize = 100_000;
 const MAX_CORRECTIONS: usize = 8;
@@ -252,11 +252,11 @@ impl Follower<'_> {
         let half_range = (limits.position_max - limits.position_min) * 0.5;
         let place = (q - limits.middle()).component_div(&half_range);
         let away = -place.map(|u| u.powi(3)).component_div(&half_range) * self.options.limit_avoidance;
-        // A joint that an arm lacks has no range.
+        // A joint that the arm lacks has an empty range.
         away.zip_map(&half_range, |rate, half| if half > 0.0 { rate } else { 0.0 })
     }
 
-    /// One step of the fourth-order Runge–Kutta method, then Newton's onto the exact pose.
+    /// One step of the fourth-order Runge–Kutta method, followed by Newton steps to the exact pose.
     fn step(&self, s: f64, q: &JointVector, rate: &JointVector, step_m: f64) -> Result<JointVector, KinematicsError> {
         let half = step_m * 0.5;
         let second = self.rate(s + half, &(q + rate * half))?;
@@ -292,7 +292,7 @@ impl Follower<'_> {
     }
 }
 
-/// Differences of the first derivatives, of fourth order inside and at the ends.
+/// Second derivatives by differences of the first derivatives, of fourth order inside and at the ends.
 fn fill_second_derivatives(knots: &mut [Knot], step_m: f64) {
     let last = knots.len() - 1;
     let scale = 1.0 / (12.0 * step_m);
@@ -318,7 +318,7 @@ fn fill_second_derivatives(knots: &mut [Knot], step_m: f64) {
     }
 }
 
-/// The quintic with the given position, first and second derivative at both ends, at `share` of the piece.
+/// The quintic with the given position, first and second derivative at both ends, at a fraction `share` of the piece.
 fn hermite(from: &Knot, to: &Knot, step_m: f64, share: f64) -> PathPoint {
     let c1 = from.dq * step_m;
     let c2 = from.ddq * (0.5 * step_m * step_m);

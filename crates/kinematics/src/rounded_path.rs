@@ -1,10 +1,11 @@
 //! A path through waypoints with rounded corners, in joint space.
 //!
-//! On a straight part q' = u is constant. Around a waypoint q' goes from the unit direction u₀ of the part before to u₁ of the part after:
-//! `q' = u₀ + (u₁ - u₀) (3x² - 2x³)`, x from 0 to 1 over a length 2d, d before the waypoint and d after it. So the path is twice continuously
-//! differentiable, its third derivative is bounded, and each joint's q' lies between those of the two parts.
+//! On a straight part, q' = u is constant. Around a waypoint, q' changes from the unit direction u₀ of the previous
+//! part to the direction u₁ of the next one: `q' = u₀ + (u₁ - u₀) (3x² - 2x³)`, with x from 0 to 1 over a length 2d, d
+//! before the waypoint and d after it. The path is therefore twice continuously differentiable, its third derivative is
+//! bounded, and each joint's q' is between its values on the two parts.
 //!
-//! Lengths are the time, in seconds, that the slowest joint takes at the Panda's full speed, for any arm: max |Δq| /
+//! A length is the time, in seconds, that the slowest joint takes at the Panda's full speed, for any arm: max |Δq| /
 //! velocity.
 
 use crate::joints::{JointVector, NUM_JOINTS};
@@ -21,7 +22,7 @@ pub struct RoundedPath {
 /// A part of a path that is straight, or a corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
-    /// Its start on the path.
+    /// Start of the piece on the path.
     pub(crate) from: f64,
     pub(crate) length: f64,
     start: JointVector,
@@ -51,7 +52,8 @@ fn direction(from: &JointVector, to: &JointVector) -> JointVector {
 }
 
 impl Corner {
-    /// The corner that starts this far (s) before the waypoint and ends as far after it.
+    /// The corner that starts at the distance `size_secs` (s) before the waypoint and ends at the same distance after
+    /// it.
     pub(crate) fn rounded(&self, size_secs: f64, from: f64) -> Piece {
         let (one, other) = (direction(&self.before, &self.waypoint), direction(&self.waypoint, &self.after));
         Piece {
@@ -65,7 +67,7 @@ impl Corner {
 }
 
 impl Piece {
-    /// Configuration and derivatives at this distance from the piece's start.
+    /// Configuration and derivatives at this distance from the start of the piece.
     pub(crate) fn at(&self, along: f64) -> PathPoint {
         let x = along / self.length;
         let turned = x * x * (3.0 - 2.0 * x);
@@ -78,7 +80,7 @@ impl Piece {
         }
     }
 
-    /// Upper bound of each joint's turn over the piece, from its largest rate.
+    /// Upper bound of the angle that each joint covers along the piece, from its largest rate.
     pub(crate) fn max_turns(&self) -> JointVector {
         self.direction.abs().sup(&(self.direction + self.change).abs()) * self.length
     }
@@ -89,18 +91,18 @@ impl Piece {
 }
 
 impl RoundedPath {
-    /// Through waypoints (rad), with no two equal in a row; each inner one has its corner's size: the distance of the
-    /// corner's start and end from the waypoint, s at full speed.
+    /// Creates a path through waypoints (rad), no two successive ones equal. Each inner waypoint has the size of its
+    /// corner: the distance of the corner's start and end from the waypoint, s at full speed.
     ///
     /// # Panics
     /// If the numbers do not match, a size is not positive, or corners overlap.
     pub fn new(waypoints: &[JointVector], corner_secs: &[f64]) -> Self {
-        assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "each inner waypoint has a corner");
+        assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "one corner for each inner waypoint");
         let mut pieces = Vec::with_capacity(2 * waypoints.len());
         let mut from = 0.0;
         for (index, pair) in waypoints.windows(2).enumerate() {
             let length = length_secs(&pair[0], &pair[1]);
-            assert!(length > 0.0, "waypoints {index} and the next are the same");
+            assert!(length > 0.0, "waypoint {index} equals the next one");
             let before = if index == 0 { 0.0 } else { corner_secs[index - 1] };
             let after = corner_secs.get(index).copied().unwrap_or(0.0);
             let straight = length - before - after;
@@ -122,7 +124,7 @@ impl RoundedPath {
         Self { pieces, start: waypoints[0], end: waypoints[waypoints.len() - 1] }
     }
 
-    /// Length: the time of the slowest joint at Franka's full speed, s.
+    /// Length: the time of the slowest joint at the Panda's full speed, s.
     pub fn length_secs(&self) -> f64 {
         self.pieces.last().map_or(0.0, |last| last.from + last.length)
     }
@@ -137,7 +139,8 @@ impl RoundedPath {
         &self.end
     }
 
-    /// The configuration and its derivatives at a length (s), clamped to the path: rad, rad/s, rad/s², rad/s³, as if it were followed at full speed.
+    /// The configuration and its derivatives at a length (s), which is clamped to the path: rad, rad/s, rad/s², rad/s³,
+    /// as if the path were followed at full speed.
     pub fn at(&self, length_secs: f64) -> PathPoint {
         let along = length_secs.clamp(0.0, self.length_secs());
         let next = self.pieces.partition_point(|piece| piece.from <= along);
@@ -150,7 +153,7 @@ impl RoundedPath {
     }
 }
 
-/// A straight part shorter than this share of the distance between two waypoints is a rounding error.
+/// A straight part shorter than this fraction of the distance between two waypoints is a rounding error.
 const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]
@@ -162,14 +165,16 @@ mod tests {
 
     #[test]
     fn a_right_angle_of_two_joints_is_rounded_as_computed_by_hand() {
-        // Joints 1 and 2 turn one after the other for a second each at 2.175 rad/s; the corner begins half a second before.
+        // Joints 1 and 2 rotate one after the other for a second each at 2.175 rad/s; the corner begins half a second
+        // before the waypoint.
         let zero = JointVector::zeros();
         let (mut middle, mut end) = (zero, zero);
         middle[0] = 2.175;
         (end[0], end[1]) = (2.175, 2.175);
         let path = RoundedPath::new(&[zero, middle, end], &[0.5]);
         assert!((path.length_secs() - 2.0).abs() < 1e-12);
-        // Half way x = 1/2: the turn so far is 1 s · (1/4) (3/4) = 3/16... of which joint 2 has 0.09375 s and joint 1 lacks as much.
+        // At the middle x = 1/2, the change of direction so far is 1 s · (1/4) (3/4) = 3/16, of which joint 2 has
+        // 0.09375 s; joint 1 lacks as much.
         let half = path.at(1.0);
         assert!((half.q[0] - 2.175 * (1.0 - 0.09375)).abs() < 1e-12, "{}", half.q);
         assert!((half.q[1] - 2.175 * 0.09375).abs() < 1e-12, "{}", half.q);

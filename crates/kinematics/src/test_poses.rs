@@ -1,4 +1,4 @@
-//! Poses and configurations used by the tests of several files.
+//! Poses and configurations that the tests of several files use.
 
 use std::f64::consts::PI;
 
@@ -9,13 +9,13 @@ use rand_pcg::Pcg64Mcg;
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 
-/// Anywhere within Franka's joint ranges.
+/// A random configuration within Franka's joint ranges.
 pub fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
     let limits = JointLimits::panda();
     JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
 }
 
-/// The hand vertically down, turned by `yaw_rad` about the vertical.
+/// The hand points vertically down, rotated by `yaw_rad` about the vertical.
 pub fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::new(x, y, z),

@@ -1,11 +1,12 @@
 //! Motions in time: joint positions, velocities and accelerations within the robot's limits.
 //!
-//! - Point to point from rest: all joints in proportion along a straight line in joint space, so that the path does not
-//!   depend on the speed, and a clearance found for it holds at any speed.
-//! - Point to point from a state in motion: each joint on its own profile, all ending at the same time (rsruckig).
-//! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom) stretched in time
-//!   by the smallest factor that keeps every joint's and the tcp's velocity, acceleration and jerk inside their limits.
-//! - Along a rounded path in joint space: nearly the quickest within all limits, torques too (timing/).
+//! - Point to point from rest: all joints move in proportion along a straight line in joint space, so the path does not
+//!   depend on the speed, and a clearance computed for it holds at any speed.
+//! - Point to point from a state in motion: each joint has its own profile, and all end at the same time (rsruckig).
+//! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom), stretched in
+//!   time by the smallest factor that keeps velocity, acceleration and jerk of every joint and of the tcp within their
+//!   limits.
+//! - Along a rounded path in joint space: nearly the fastest motion within all limits, including torques (timing/).
 
 use rsruckig::prelude::{InputParameter, Ruckig, Synchronization, ThrowErrorHandler};
 
@@ -55,7 +56,7 @@ struct TimedPath {
 #[derive(Debug, Clone)]
 struct Profile(rsruckig::trajectory::Trajectory<1>);
 
-/// `s` and its derivatives by time.
+/// `s` and its derivatives with respect to time.
 #[derive(Debug, Clone, Copy)]
 struct Progress {
     s: f64,
@@ -65,7 +66,7 @@ struct Progress {
 }
 
 impl Trajectory {
-    /// The quickest straight motion in joint space from rest at `start` to rest at `end`.
+    /// The fastest straight motion in joint space from rest at `start` to rest at `end`.
     ///
     /// # Errors
     /// [`KinematicsError::NotFinite`], or [`KinematicsError::JointOutOfRange`] for an end outside `limits`.
@@ -80,7 +81,7 @@ impl Trajectory {
         if distance < MIN_DISTANCE_RAD {
             return Ok(Self { motion: Motion::Still, duration_secs: 0.0, start: at_rest(start), end: *end });
         }
-        // The joint that moves furthest has |direction| = 1; one that hardly moves sets no bound.
+        // The joint that moves furthest has |direction| = 1. A joint that hardly moves gives no bound.
         let direction = (end - start) / distance;
         let steepness = direction.abs().add_scalar(f64::MIN_POSITIVE);
         let bound = |limit: &JointVector| limit.component_div(&steepness).min();
@@ -98,15 +99,15 @@ impl Trajectory {
         })
     }
 
-    /// The quickest motion from a state in motion to rest at `end`, each joint with its own profile, all ending
-    /// together.
+    /// The fastest motion from a state in motion to rest at `end`. Each joint has its own profile, and all end at the
+    /// same time.
     ///
     /// # Units and frames
-    /// rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
+    /// In rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
     ///
     /// # Errors
-    /// As for [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] if the arm cannot be stopped from the
-    /// state inside the position limits.
+    /// The errors of [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] if the arm cannot stop from
+    /// this state inside the position limits.
     pub fn from_motion(
         start: &JointVector,
         start_velocity: &JointVector,
@@ -136,7 +137,7 @@ impl Trajectory {
                 q[joint_idx] = found_rad;
                 if limits.margins(&q)[joint_idx] < -LIMIT_ROUNDING_RAD {
                     return Err(KinematicsError::JointOutOfRange {
-                        what: "the motion on its way",
+                        what: "a point of the motion",
                         violation: limits.violation_at(&q, joint_idx),
                     });
                 }
@@ -150,10 +151,10 @@ impl Trajectory {
         })
     }
 
-    /// A quick motion from rest to rest along a straight Cartesian path.
+    /// A fast motion from rest to rest along a straight Cartesian path.
     ///
-    /// Of a few cruising speeds the one with the shortest time is used; it is not the time optimum, which would brake
-    /// and accelerate along the path.
+    /// A few cruising speeds are tried, and the one with the shortest duration is used. This is not the time optimum,
+    /// which would brake and accelerate along the path.
     ///
     /// # Errors
     /// [`KinematicsError::Trajectory`] if the generator fails.
@@ -187,8 +188,8 @@ impl Trajectory {
         })
     }
 
-    /// Nearly the quickest motion from rest to rest along a rounded path, within the limits of joints and tcp,
-    /// including the torques of an arm with its load.
+    /// Nearly the fastest motion from rest to rest along a rounded path, within the limits of joints and tcp and within
+    /// the torques of an arm with its load.
     ///
     /// # Errors
     /// [`KinematicsError::JointOutOfRange`] for an end outside the limits; [`KinematicsError::Trajectory`] if the
@@ -211,7 +212,7 @@ impl Trajectory {
         })
     }
 
-    /// For a motion along a rounded path: its duration, s, without a jerk limit. The other limits are satisfied at the
+    /// For a motion along a rounded path: its duration without a jerk limit, s. The other limits are satisfied at the
     /// points of its grid.
     pub fn without_jerk_limit_secs(&self) -> Option<f64> {
         match &self.motion {
@@ -237,8 +238,8 @@ impl Trajectory {
 
     /// Joint positions (rad), velocities (rad/s) and accelerations (rad/s²) at `time_secs`.
     ///
-    /// Before the start the arm is in its start state, after the end it is at rest. A time that is not a number counts
-    /// as the start.
+    /// Before the start the arm is in its start state, after the end it is at rest. A time that is NaN counts as the
+    /// start.
     pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
         if time_secs.is_nan() || time_secs <= 0.0 {
             return self.start;
@@ -270,7 +271,7 @@ impl Trajectory {
     }
 }
 
-/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`, which belong to a profile that is
+/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`; these belong to a profile that is
 /// stretched in time.
 fn at_progress(point: &PathPoint, velocity: f64, acceleration: f64, stretch: f64) -> State {
     let (velocity, acceleration) = (velocity / stretch, acceleration / stretch.powi(2));
@@ -289,20 +290,20 @@ fn check_in_range(what: &'static str, q: &JointVector, limits: &JointLimits) -> 
     }
 }
 
-/// Shorter motions count as no motion.
+/// Motions shorter than this are no motion, rad.
 const MIN_DISTANCE_RAD: f64 = 1e-12;
-/// Positions this far beyond a limit are rounding errors.
+/// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Cruising speeds tried on a path, as shares of the speed that its most limiting joint allows.
+/// Cruising speeds that are tried on a path, as fractions of the speed that its most limiting joint allows.
 const CRUISING_SPEED_SHARES: [f64; 4] = [1.0, 0.75, 0.55, 0.4];
-/// Margin between the sampled maximum and the limit, for values between samples.
+/// Margin between the maximum of the samples and the limit, for values between samples.
 const HEADROOM: f64 = 1.002;
 const SAMPLES_PER_PHASE: usize = 160;
 
 fn calculate<const DOF: usize>(
     input: &InputParameter<DOF>,
 ) -> Result<rsruckig::trajectory::Trajectory<DOF>, KinematicsError> {
-    // The control cycle only matters for online use.
+    // The control cycle only matters for online use, so its value has no effect.
     const CYCLE_SECS: f64 = 0.001;
     let mut trajectory = rsruckig::trajectory::Trajectory::<DOF>::new(None);
     Ruckig::<DOF, ThrowErrorHandler>::new(None, CYCLE_SECS)
@@ -348,8 +349,8 @@ impl Profile {
         progress
     }
 
-    /// Evenly spaced states in each phase of constant jerk, its two ends included: the short phases at the full jerk
-    /// must not lie between samples.
+    /// Evenly spaced states in each phase of constant jerk, with both ends: the short phases of full jerk must not lie
+    /// between samples.
     fn states(&self) -> impl Iterator<Item = Progress> + '_ {
         let phases = &self.0.profiles[0][0];
         (0..phases.t.len()).filter(|i| phases.t[*i] > 0.0).flat_map(move |i| {
@@ -363,11 +364,11 @@ impl Profile {
     }
 }
 
-/// Velocity, acceleration and jerk limits along a path: of the joints and, as two more "joints" that are linear in `s`, of the
-/// tcp's position and orientation.
+/// Limits of velocity, acceleration and jerk along a path: those of the joints and, as two more "joints" that are
+/// linear in `s`, those of the tcp's position and orientation.
 struct Bounds<'a> {
     limits: &'a JointLimits,
-    /// Of `s` itself, from the Cartesian limits.
+    /// Limits of `s` itself, from the Cartesian limits.
     velocity: f64,
     acceleration: f64,
     jerk: f64,
@@ -377,7 +378,7 @@ impl<'a> Bounds<'a> {
     fn new(path: &JointPath, limits: &'a JointLimits, cartesian: &CartesianLimits) -> Self {
         let linear = path.length_m() / path.distance_m();
         let angular = path.length_m() / path.angle_rad();
-        // A line without translation or without rotation divides by zero, and infinity is the right bound.
+        // Without translation or rotation this divides by zero, and the resulting infinity is the correct bound.
         Self {
             limits,
             velocity: (cartesian.velocity_m_s * linear).min(cartesian.angular_velocity_rad_s * angular),
@@ -386,7 +387,7 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// The speed that the path would allow if it were also straight in joint space.
+    /// The limits of `s` if the path were also straight in joint space.
     fn fastest(&self, path: &JointPath) -> Progress {
         let mut steepest = JointVector::repeat(f64::MIN_POSITIVE);
         let num_samples = 2 * path.waypoints().len();
@@ -426,7 +427,7 @@ impl<'a> Bounds<'a> {
     }
 }
 
-/// The largest share of its limit used by a joint.
+/// The largest used fraction of the limits of the joints.
 fn share(values: &JointVector, limits: &JointVector) -> f64 {
     values.abs().component_div(limits).max()
 }

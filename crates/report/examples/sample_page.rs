@@ -31,7 +31,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         .kicker("Rehearsal in simulation")
         .lead(
             "One photograph, one marked grasp, 142 seconds of teaching on two cores. \
-             The robot then looked for the part, went to it and lifted it, ten times from poses it had not seen.",
+             The robot then searched for the part, moved to it and lifted it, ten times from unseen poses.",
         )
         .cover(Figure::animation(animation()?).alt("The wrist camera comes down on the pendulum and the jaws close.").caption("Attempt 1 from the wrist camera, at twice its speed: look, hover, approach, close, lift."))
         .key_figure(KeyFigure::new("142", "s", "to teach, from one photo"))
@@ -53,7 +53,8 @@ fn report() -> Result<Report, sdg_report::ReportError> {
                         .row("S", 78.8, [68.6, 86.3], None),
                 )
                 .table(attempts_table(&STEPS, &attempts).caption(
-                    "Where the part lay is in the robot's base frame. Errors are those of the second detection, from above the part.",
+                    "The part's position is in the robot's base frame. Errors are those of the second detection, from \
+                     above the part.",
                 )),
         )
         .section(
@@ -95,20 +96,21 @@ fn demonstration() -> Section {
         Figure::photo(sample).alt(format!("augmented sample {idx}"))
     });
     Section::new("Demonstration")
-        .lead("Input from the person: a photograph, a box, an outline, and a line along which to grasp.")
+        .lead("Human input: a photograph, a box, an outline, and a line along which to grasp.")
         .gallery(
             GallerySize::Large,
             vec![
                 Figure::photo(raw).caption("As photographed by the wrist camera."),
                 Figure::photo(marked).caption(
-                    "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws that follow from it (orange).",
+                    "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws computed from it \
+                     (orange).",
                 ),
             ],
         )
         .captioned_gallery(
             GallerySize::Small,
             samples.collect(),
-            "Augmented samples 0 to 23. Each sixth scene is without the part, so that the model learns when it is not there.",
+            "Augmented samples 0 to 23. Each sixth scene is without the part, so that the model learns to reject.",
         )
 }
 
@@ -141,7 +143,7 @@ fn teaching() -> Section {
         .series(Series::new("median", every(&degrees)).with_markers())
         .limit(10.0, "limit 10°")
         .moment(275.0, "kept")
-        .caption("On 64 held-back augmentations.");
+        .caption("On 64 held-out augmentations.");
     let found = Chart::new("Validation: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
         .series(
             Series::new(
@@ -178,7 +180,10 @@ fn detections() -> Section {
         };
         draw_detection(&mut picture, &mark);
         Figure::photo(picture).caption(if refused {
-            format!("Test image {idx}: no part here; the network fired, the demonstration disagreed (0.66).")
+            format!(
+                "Test image {idx}: no part in the picture; the network detected one, and the demonstration did \
+                     not agree (0.66)."
+            )
         } else {
             format!("Test image {idx}: error {:.1} mm, {:.1}°.", 0.6 + 0.3 * idx as f64, 0.2 + 0.1 * idx as f64)
         })
@@ -186,10 +191,10 @@ fn detections() -> Section {
     Section::new("Detections")
         .lead("On images not used for teaching: other poses, light, table, and distractors.")
         .gallery(GallerySize::Medium, pictures.collect())
-        .notice(Tone::Warning, "One of six was refused: laid over the image, the demonstration did not agree with it.")
+        .notice(Tone::Warning, "One of six was refused: the demonstration did not agree with the image.")
 }
 
-/// The steps of an attempt, named as in `sdg_robot::GraspStep`.
+/// The steps of an attempt, with the names of `sdg_robot::GraspStep`.
 const STEPS: [&str; 6] = ["detect", "hover", "approach", "close", "lift", "hold"];
 
 fn attempts() -> Vec<AttemptSummary> {
@@ -255,7 +260,7 @@ fn grasp_line() -> GraspLine {
     GraspLine::new(Point2::new(-60.0, 0.0), Point2::new(60.0, 0.0))
 }
 
-/// A bar between two eyes, one large, one small.
+/// A bar with a large eye and a small eye.
 fn part_outline() -> Polygon {
     let arc = |center: f64, radius: f64, from: f64, to: f64| {
         (0..=24).map(move |k| {

@@ -5,8 +5,8 @@
 //!                                   └────── coarser, until it fits max_bytes ──────┘
 //! ```
 //!
-//! All frames share one palette, so that a static background does not flicker. Each frame contains only the rectangle
-//! that changed, transparent elsewhere: with a fixed camera, only motion takes space.
+//! All frames use one palette, so that a static background does not flicker. Each frame contains only the rectangle
+//! that changed and is transparent elsewhere: with a fixed camera, only motion needs space.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -23,14 +23,14 @@ use crate::error::ReportError;
 pub struct AnimationOptions {
     /// Frames per second as recorded.
     pub source_fps: f64,
-    /// Frames per second as shown; further frames are left out. At most 50, the maximum of browsers.
+    /// Frames per second as shown; other frames are left out. At most 50, which is the maximum in browsers.
     pub fps: f64,
     /// Playback speed relative to the recording.
     pub speed: f64,
-    /// Maximum width; wider frames are scaled down.
+    /// Maximum width in pixels; wider frames are scaled down.
     pub max_width: u32,
-    /// Maximum size of the file. To reach it, colours, then frames, then pixels are reduced; if nothing suffices, the
-    /// smallest result is used, which may be larger.
+    /// Maximum size of the file in bytes. To reach it, colours, then frames, then pixels are reduced. If this is not
+    /// enough, the smallest result is used, which is larger.
     pub max_bytes: usize,
     /// Time in seconds for which the last frame is shown before the animation restarts.
     pub hold_last_secs: f64,
@@ -51,10 +51,10 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Encodes frames that are all available; see [`AnimationRecorder`] for frames that arrive one by one.
+    /// Encodes frames that are all available. For frames that arrive one by one, see [`AnimationRecorder`].
     ///
     /// # Errors
-    /// As [`AnimationRecorder::push`] and [`AnimationRecorder::finish`].
+    /// The errors of [`AnimationRecorder::push`] and [`AnimationRecorder::finish`].
     pub fn encode(frames: &[RgbImage], options: &AnimationOptions) -> Result<Self, ReportError> {
         let mut recorder = AnimationRecorder::new(options.clone());
         for frame in frames {
@@ -63,7 +63,7 @@ impl Animation {
         recorder.finish()
     }
 
-    /// The GIF file's bytes.
+    /// The bytes of the GIF file.
     #[must_use]
     pub fn gif(&self) -> &[u8] {
         &self.gif
@@ -89,7 +89,7 @@ pub struct AnimationRecorder {
     source_size: Option<(u32, u32)>,
     num_pushed: usize,
     frames: Vec<RgbImage>,
-    /// The latest frame if it was left out: the end must be shown.
+    /// The latest frame, if it was left out: the animation must show the end.
     left_out: Option<RgbImage>,
 }
 
@@ -110,7 +110,8 @@ impl AnimationRecorder {
     /// Adds the next frame of the recording.
     ///
     /// # Errors
-    /// [`ReportError::FrameSize`] if its size differs from the first, [`ReportError::PictureSize`] if it has no pixels.
+    /// [`ReportError::FrameSize`] if the size differs from the first frame's, [`ReportError::PictureSize`] if the frame
+    /// has no pixels.
     pub fn push(&mut self, frame: &RgbImage) -> Result<(), ReportError> {
         let found = frame.dimensions();
         if found.0 == 0 || found.1 == 0 {
@@ -138,7 +139,7 @@ impl AnimationRecorder {
     /// Encodes the recording.
     ///
     /// # Errors
-    /// [`ReportError::NoFrames`] if nothing was pushed, [`ReportError::PictureSize`] if a side exceeds GIF's limit of
+    /// [`ReportError::NoFrames`] if there is no frame, [`ReportError::PictureSize`] if a side exceeds GIF's limit of
     /// 65535.
     pub fn finish(mut self) -> Result<Animation, ReportError> {
         self.frames.extend(self.left_out.take());
@@ -166,7 +167,7 @@ impl AnimationRecorder {
 struct Economy {
     /// Number of colours in the palette; one more entry means "unchanged".
     num_colors: usize,
-    /// Largest difference of a channel that counts as unchanged.
+    /// Maximum difference of a channel in pixels that count as unchanged.
     tolerance: u8,
     /// Every `stride`-th frame is kept.
     stride: usize,
@@ -247,11 +248,11 @@ fn encode_gif(
                 indices[start..start + usize::from(region_width)].iter().copied()
             })
             .collect::<Vec<u8>>();
-        // Delays in hundredths of a second, rounded so that the total duration is kept.
+        // Delays are in hundredths of a second, and are rounded so that the total duration is kept.
         let ticks = |frame: usize| (frame as f64 * 100.0 * economy.stride as f64 / fps).round();
         let pause = if order + 1 == kept.len() { 100.0 * hold_last_secs.max(0.0) } else { 0.0 };
         let frame = Frame {
-            // Browsers show a delay of less than 2 hundredths as 10.
+            // Browsers show a delay of less than 2 hundredths of a second as 10.
             delay: (ticks(order + 1) - ticks(order) + pause).clamp(2.0, 65_535.0) as u16,
             dispose: DisposalMethod::Keep,
             transparent: Some(unchanged),
@@ -275,7 +276,8 @@ fn encode_gif(
     Ok((bytes, kept.len()))
 }
 
-/// Left, top, width and height of the changed region; one pixel if nothing changed, because a frame must not be empty.
+/// Left, top, width and height of the changed region; one pixel if there is no change, because a frame must not be
+/// empty.
 fn changed_region(indices: &[u8], unchanged: u8, columns: u16, rows: u16) -> (u16, u16, u16, u16) {
     let (mut left, mut top, mut right, mut bottom) = (columns, rows, 0, 0);
     for (row, line) in (0..rows).zip(indices.chunks_exact(usize::from(columns))) {
@@ -294,7 +296,7 @@ fn changed_region(indices: &[u8], unchanged: u8, columns: u16, rows: u16) -> (u1
 /// Colours for all frames.
 struct Palette {
     rgb: Vec<[u8; 3]>,
-    /// Nearest entry for each colour looked up so far.
+    /// The nearest entry for each colour that was looked up.
     nearest: HashMap<[u8; 3], u8>,
 }
 
@@ -302,7 +304,7 @@ struct Palette {
 const PALETTE_SAMPLES: usize = 300_000;
 
 impl Palette {
-    /// The frames' own colours if they are few, otherwise a palette computed from evenly sampled pixels.
+    /// The frames' own colours if there are few; otherwise a palette computed from evenly sampled pixels.
     fn of(frames: &[Cow<'_, RgbImage>], num_colors: usize) -> Self {
         let mut distinct = HashSet::new();
         let few = frames.iter().flat_map(|frame| frame.pixels()).all(|pixel| {
@@ -311,7 +313,7 @@ impl Palette {
         });
         let rgb = if few {
             let mut colors: Vec<[u8; 3]> = distinct.into_iter().collect();
-            // A hash set has no fixed order, and the same frames must give the same file.
+            // Sorted, because a hash set has no fixed order and the same frames must give the same file.
             colors.sort_unstable();
             colors
         } else {
@@ -367,7 +369,7 @@ mod tests {
             .collect()
     }
 
-    /// The frames as shown by a viewer, each drawn over the previous one.
+    /// The frames as shown by a viewer, which draws each over the previous one.
     fn decode(bytes: &[u8]) -> (Vec<RgbImage>, Vec<u16>) {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
@@ -398,7 +400,7 @@ mod tests {
             let mean = total as f64 / before.as_raw().len() as f64;
             assert!(mean < 4.0, "mean difference {mean} of 255");
         }
-        // 12 frames per second: 100 hundredths in total, and 150 more for the last.
+        // 12 frames per second: 100 hundredths of a second in total, and 150 more for the last frame.
         assert_eq!(delays.iter().map(|&d| u32::from(d)).sum::<u32>(), 250);
     }
 
@@ -424,7 +426,7 @@ mod tests {
         let frames = moving_square(32, 80, 60);
         let options = AnimationOptions { source_fps: 30.0, fps: 10.0, hold_last_secs: 0.0, ..Default::default() };
         let animation = Animation::encode(&frames, &options).unwrap();
-        // 0, 3, …, 30, and 31 because it is the last.
+        // Frames 0, 3, …, 30, and 31 because it is the last.
         assert_eq!(animation.num_frames(), 12);
         assert_eq!(animation.still(), &frames[31]);
     }

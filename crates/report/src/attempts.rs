@@ -5,7 +5,7 @@ use sdg_geometry::median;
 use crate::chart::Matrix;
 use crate::table::{Cell, Column, Table, Tone};
 
-/// Error of a detection against the ground truth.
+/// Error of a detection relative to the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectionError {
     /// Distance of the centres on the table, in millimetres.
@@ -17,25 +17,25 @@ pub struct DetectionError {
 /// A grasp attempt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptSummary {
-    /// Its number, from 1.
+    /// Number of the attempt, from 1.
     pub number: usize,
     /// Position of the part in the robot's base frame, x and y in millimetres.
     pub object_mm: [f64; 2],
     /// Angle of the part, in degrees.
     pub object_angle_deg: f64,
-    /// The detection's error, if there was a detection.
+    /// The error of the detection; `None` without a detection.
     pub detection_error: Option<DetectionError>,
-    /// Index of the step at which it ended, from 0: the last one on success.
+    /// Index of the step at which the attempt ended, from 0; the last step on success.
     pub step: usize,
     /// Whether the part was held at the end.
     pub success: bool,
-    /// Why it failed; empty on success.
+    /// The reason of the failure; empty on success.
     pub why: String,
     /// Duration in seconds.
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians below; `steps` are the names of the steps in order.
+/// The table of attempts, with medians at the bottom; `steps` are the names of the steps in order.
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
@@ -44,9 +44,9 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
         Column::number("#"),
         Column::text("outcome"),
         Column::text("reached"),
-        Column::number("x").unit("mm").group("part lay at"),
-        Column::number("y").unit("mm").group("part lay at"),
-        Column::number("angle").unit("°").group("part lay at"),
+        Column::number("x").unit("mm").group("part position"),
+        Column::number("y").unit("mm").group("part position"),
+        Column::number("angle").unit("°").group("part position"),
         Column::number("place").unit("mm").group("detection error"),
         Column::number("angle").unit("°").group("detection error"),
         Column::number("time").unit("s"),
@@ -98,8 +98,8 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
     ])
 }
 
-/// Detections against outcomes: rows are classes of the last detection's error, columns the step (of `steps`) at which
-/// the attempt ended.
+/// Detections and outcomes: the rows are classes of the last detection's error, the columns are the steps (of `steps`)
+/// at which attempts ended.
 ///
 /// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]
@@ -115,11 +115,11 @@ pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64
         counts[seen(attempt)][ended] += 1;
     }
     let columns = steps.iter().copied().chain(["held"]);
-    let labels = ["seen right".to_owned(), "seen beside it".to_owned(), "not seen".to_owned()];
-    let matrix = Matrix::new("What was seen, and where the attempt ended", columns).good_column(steps.len());
+    let labels = ["correct".to_owned(), "wrong".to_owned(), "not detected".to_owned()];
+    let matrix = Matrix::new("Last detection, and step at which the attempt ended", columns).good_column(steps.len());
     labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
-        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is \
-         due to the robot, in the others to perception."
+        "Correct: the last detection is within {right_mm:.0} mm and {right_deg:.0}° of the ground truth. A \
+         failure in the first row is due to the robot, in the others to perception."
     ))
 }
 
@@ -157,7 +157,7 @@ mod tests {
         )
         .to_html();
         assert_well_formed(&html);
-        assert!(html.contains("seen right: lift 1, held 1. seen beside it: close 1. not seen: detect 1."), "{html}");
+        assert!(html.contains("correct: lift 1, held 1. wrong: close 1. not detected: detect 1."), "{html}");
     }
 
     #[test]
@@ -169,9 +169,9 @@ mod tests {
         .to_html();
         assert_well_formed(&html);
         assert!(html.contains("1 of 3 held") && html.contains("slipped &lt;out&gt;"));
-        // Six steps of the first, four of the second (detect to close), none of the third.
+        // Six steps of the first attempt, four of the second (detect to close), none of the third.
         assert_eq!(html.matches("<i class=\"on\"></i>").count(), 10);
-        // The median of 1 and 2 mm; the third has no detection.
+        // The median of 1 and 2 mm; the third attempt has no detection.
         assert!(html.contains("<td class=\"number\">1.5</td>"), "{html}");
     }
 

@@ -1,10 +1,10 @@
-//! Errors of making and writing a report.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a report, an animation or a file could not be made.
+/// The reason why a report, an animation or a file cannot be made.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -12,13 +12,13 @@ pub enum ReportError {
     /// A folder is missing and could not be created.
     #[error("cannot create the folder {}: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
-    /// The page's file could not be written.
+    /// The file of the page cannot be written.
     #[error(transparent)]
     File(#[from] sdg_files::FileError),
-    /// An animation without a frame.
+    /// The animation has no frames.
     #[error("an animation needs at least one frame, found none")]
     NoFrames,
-    /// A frame or picture without pixels, or one that is too large for its format.
+    /// A frame or picture has no pixels, or is too large for its format.
     #[error("{what}: expected between 1x1 and {limit}x{limit} pixels, found {width}x{height}")]
     PictureSize {
         what: &'static str,
@@ -27,7 +27,7 @@ pub enum ReportError {
         /// Maximum side of the format.
         limit: u32,
     },
-    /// A frame whose size differs from the first one's.
+    /// The size of a frame differs from the first one's.
     #[error(
         "frame {frame_idx} of an animation: expected {}x{} pixels as in the first frame, found {}x{}",
         expected.0, expected.1, found.0, found.1

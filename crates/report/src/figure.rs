@@ -1,4 +1,4 @@
-//! Pictures on the page: photographs as JPEG, animations as GIF, both embedded in the page.
+//! Pictures on the page: photos as JPEG, animations as GIF, both embedded.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -24,12 +24,12 @@ enum Picture {
     Animation(Animation),
 }
 
-/// Encoding of photographs on the page.
+/// Encoding of photos on the page.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PhotoQuality {
     /// JPEG quality, 1 to 100.
     pub(crate) jpeg: u8,
-    /// Maximum width.
+    /// Maximum width, in pixels.
     pub(crate) max_width: u32,
 }
 
@@ -40,20 +40,20 @@ impl Figure {
         Self { picture: Picture::Photo(image), alt: None, caption: None }
     }
 
-    /// An animated picture; readers who prefer no motion get its last frame.
+    /// An animated picture. Readers who prefer no motion see its last frame.
     #[must_use]
     pub fn animation(animation: Animation) -> Self {
         Self { picture: Picture::Animation(animation), alt: None, caption: None }
     }
 
-    /// Text under the picture.
+    /// Sets the text below the picture.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = Some(caption.into());
         self
     }
 
-    /// A description for readers who cannot see the picture; default: the caption.
+    /// Sets a description for readers who cannot see the picture; default: the caption.
     #[must_use]
     pub fn alt(mut self, alt: impl Into<String>) -> Self {
         self.alt = Some(alt.into());
@@ -64,7 +64,7 @@ impl Figure {
         matches!(self.picture, Picture::Photo(_))
     }
 
-    /// The figure as HTML, with photographs reduced to the maximum width.
+    /// The figure as HTML, with photos reduced to the maximum width.
     pub(crate) fn to_html(&self, quality: PhotoQuality) -> Result<String, ReportError> {
         let alt = escape(self.alt.as_ref().or(self.caption.as_ref()).map_or("", String::as_str));
         let mut html = String::from("<figure class=\"picture\">");
@@ -93,7 +93,7 @@ fn data_address(format: &str, bytes: &[u8]) -> String {
     format!("data:image/{format};base64,{}", STANDARD.encode(bytes))
 }
 
-/// The element has width and height, so that the page's layout does not shift.
+/// The image element. It states width and height, so that the page's layout does not shift while loading.
 fn image_element(format: &str, bytes: &[u8], width: u32, height: u32, alt: &str) -> String {
     format!("<img src=\"{}\" width=\"{width}\" height=\"{height}\" alt=\"{alt}\">", data_address(format, bytes))
 }

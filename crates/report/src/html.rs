@@ -2,7 +2,7 @@
 
 /// Escapes text for element content and for quoted attribute values.
 ///
-/// Control characters that HTML forbids become U+FFFD, so that a damaged label cannot break the page.
+/// Control characters that HTML forbids are replaced by U+FFFD, so that a damaged label cannot break the page.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len() + text.len() / 8);
@@ -21,7 +21,7 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// Formats a number with fixed decimals, a true minus sign, and a dash if it is not finite.
+/// Formats a number with fixed decimals and a true minus sign; a dash if the number is not finite.
 #[must_use]
 pub fn format_number(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
@@ -29,7 +29,7 @@ pub fn format_number(value: f64, decimals: usize) -> String {
     }
     let formatted = format!("{value:.decimals$}");
     match formatted.strip_prefix('-') {
-        // Rounding may give "-0.0", which means the same as "0.0".
+        // Rounding may give "-0.0", which is shown as "0.0".
         Some(digits) if digits.bytes().all(|b| matches!(b, b'0' | b'.')) => digits.to_owned(),
         Some(digits) => format!("\u{2212}{digits}"),
         None => formatted,

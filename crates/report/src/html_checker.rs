@@ -3,7 +3,7 @@
 /// Elements without an end tag.
 const VOID: [&str; 5] = ["meta", "link", "img", "br", "source"];
 
-/// Panics unless each tag is closed in order, each attribute is quoted and unique, each `&` starts an entity, and each
+/// Panics unless all tags are closed in order, attributes are quoted and unique, each `&` starts an entity, and each
 /// `id` is unique.
 pub(crate) fn assert_well_formed(html: &str) {
     let mut open: Vec<String> = Vec::new();
@@ -33,7 +33,7 @@ pub(crate) fn assert_well_formed(html: &str) {
     assert!(open.is_empty(), "left open: {open:?}");
 }
 
-/// The tag up to its closing `>`, which is the first one outside quotes.
+/// Splits a tag at its closing `>`, which is the first one outside quotes.
 fn split_tag(text: &str) -> (&str, &str) {
     let mut quoted = false;
     for (at, character) in text.char_indices() {

@@ -6,11 +6,11 @@
 //! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ DIR/index.html
 //! ```
 //!
-//! The page is one file that loads nothing and runs no script: pictures are embedded as base64, charts as inline SVG.
-//! It follows the reader's light or dark theme, adapts to a phone's width, and can be printed.
+//! The page is one file that loads no other files and runs no script: pictures are embedded as base64, charts as inline
+//! SVG. It follows the reader's light or dark theme, adapts to a phone's width, and can be printed.
 //!
-//! Deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the crate compiles in
-//! seconds and can be used by any caller.
+//! Not in this crate: grasp models, simulation and burn. The types are plain data, so that the crate compiles in
+//! seconds and has no restriction on its callers.
 //!
 //! ```
 //! use image::RgbImage;

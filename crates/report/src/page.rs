@@ -8,10 +8,10 @@ use crate::html::{escape, slug};
 use crate::section::Section;
 use crate::table::Tone;
 
-/// Target size of the page in bytes; photographs are compressed to reach it.
+/// Target size of the page in bytes; photos are compressed to reach it.
 const PAGE_BYTES: usize = 4_000_000;
 
-/// Tried in order until the page fits; the last one is used in any case.
+/// Qualities that are tried in order until the page is small enough; the last one is used in any case.
 const QUALITIES: [PhotoQuality; 4] = [
     PhotoQuality { jpeg: 86, max_width: 1280 },
     PhotoQuality { jpeg: 76, max_width: 1280 },
@@ -19,7 +19,7 @@ const QUALITIES: [PhotoQuality; 4] = [
     PhotoQuality { jpeg: 52, max_width: 640 },
 ];
 
-/// A number shown prominently.
+/// A number in large type.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyFigure {
     value: String,
@@ -29,13 +29,13 @@ pub struct KeyFigure {
 }
 
 impl KeyFigure {
-    /// A number, its unit (or `of 10`), and its meaning: `142`, `s`, `to teach`.
+    /// A number, its unit (or `of 10`), and its meaning, such as `142`, `s`, `to teach`.
     #[must_use]
     pub fn new(value: impl Into<String>, unit: impl Into<String>, label: impl Into<String>) -> Self {
         Self { value: value.into(), unit: unit.into(), label: label.into(), tone: Tone::Plain }
     }
 
-    /// The same number, coloured.
+    /// Sets the colour of the number.
     #[must_use]
     pub fn tone(mut self, tone: Tone) -> Self {
         self.tone = tone;
@@ -80,28 +80,28 @@ impl Report {
         }
     }
 
-    /// A few words above the title: the kind of run.
+    /// Sets a few words above the title: the kind of run.
     #[must_use]
     pub fn kicker(mut self, kicker: impl Into<String>) -> Self {
         self.kicker = Some(kicker.into());
         self
     }
 
-    /// One or two sentences under the title: a summary.
+    /// Sets one or two sentences below the title: a summary.
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = Some(lead.into());
         self
     }
 
-    /// Adds a key figure; three to five fit in a row.
+    /// Adds a key figure; a row has room for three to five.
     #[must_use]
     pub fn key_figure(mut self, key_figure: KeyFigure) -> Self {
         self.key_figures.push(key_figure);
         self
     }
 
-    /// A picture beside the title.
+    /// Sets a picture beside the title.
     #[must_use]
     pub fn cover(mut self, cover: Figure) -> Self {
         self.cover = Some(cover);
@@ -124,7 +124,7 @@ impl Report {
 
     /// The page as HTML. The same report gives the same bytes.
     ///
-    /// Photographs are compressed so that the page is smaller than about 4 MB if possible.
+    /// Photos are compressed so that the page is smaller than about 4 MB, if possible.
     ///
     /// # Errors
     /// [`ReportError::PictureSize`] and [`ReportError::Jpeg`] if a picture cannot be encoded.
@@ -146,7 +146,7 @@ impl Report {
     /// An existing page is kept until the new one is complete.
     ///
     /// # Errors
-    /// Those of [`Report::to_html`], and [`ReportError::Folder`] and [`ReportError::File`] if the folder or the file
+    /// The errors of [`Report::to_html`]; [`ReportError::Folder`] and [`ReportError::File`] if the folder or the file
     /// cannot be created.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, ReportError> {
         let html = self.to_html()?;
@@ -202,7 +202,7 @@ impl Report {
     }
 }
 
-/// The policy forbids the browser to load anything, whatever the page contains.
+/// The security policy forbids the browser to load any resource, whatever the page contains.
 const HEAD_START: &str = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
 <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
 <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn nothing_is_fetched_from_anywhere() {
         let html = full_report("text").to_html().unwrap();
-        // Base64 may contain anything that looks like an address; the rest of the page may not.
+        // Base64 may contain text that looks like an address; the rest of the page must not.
         let mut parts = html.split("base64,");
         let mut text = parts.next().unwrap().to_owned();
         text.extend(parts.map(|part| part.split_once('"').unwrap().1));

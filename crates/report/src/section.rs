@@ -6,12 +6,12 @@ use crate::figure::{Figure, PhotoQuality};
 use crate::html::escape;
 use crate::table::{Table, Tone};
 
-/// Width of a gallery's pictures.
+/// Width of the pictures in a gallery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GallerySize {
-    /// Many per row: samples.
+    /// Many per row, for samples.
     Small,
-    /// About three per row: detections.
+    /// About three per row, for detections.
     Medium,
     /// Two per row.
     Large,
@@ -46,7 +46,7 @@ impl Section {
         Self { title: title.into(), lead: None, blocks: Vec::new() }
     }
 
-    /// One or two sentences beside the heading: the contents of the section.
+    /// Sets one or two sentences beside the heading that describe the section.
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = Some(lead.into());
@@ -71,13 +71,13 @@ impl Section {
         self.with(Block::Figure(figure))
     }
 
-    /// Adds pictures side by side; they wrap to the screen's width.
+    /// Adds pictures side by side, which wrap at the screen's width.
     #[must_use]
     pub fn gallery(self, size: GallerySize, figures: Vec<Figure>) -> Self {
         self.with(Block::Gallery(size, figures, None))
     }
 
-    /// Adds pictures side by side with one caption for all.
+    /// Adds pictures side by side with a common caption.
     #[must_use]
     pub fn captioned_gallery(self, size: GallerySize, figures: Vec<Figure>, caption: impl Into<String>) -> Self {
         self.with(Block::Gallery(size, figures, Some(caption.into())))
@@ -95,7 +95,7 @@ impl Section {
         self.with(Block::Matrix(matrix))
     }
 
-    /// Adds shares with their intervals.
+    /// Adds fractions with their intervals.
     #[must_use]
     pub fn shares(self, shares: ShareChart) -> Self {
         self.with(Block::Shares(shares))
@@ -107,7 +107,7 @@ impl Section {
         self.with(Block::Table(table))
     }
 
-    /// Adds facts, pairs of a name and a value: seed, preset, machine, versions.
+    /// Adds facts, which are pairs of a name and a value: seed, preset, machine, versions.
     #[must_use]
     pub fn facts<K: Into<String>, V: Into<String>>(self, facts: impl IntoIterator<Item = (K, V)>) -> Self {
         self.with(Block::Facts(facts.into_iter().map(|(name, value)| (name.into(), value.into())).collect()))

@@ -5,7 +5,7 @@ use crate::html::{escape, format_number};
 /// The rating of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// None: without colour.
+    /// No rating: without colour.
     #[default]
     Plain,
     /// Good.
@@ -27,7 +27,7 @@ impl Tone {
     }
 }
 
-/// The content of a cell.
+/// The contents of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     /// Text, aligned left.
@@ -36,12 +36,12 @@ pub enum Cell {
     Number {
         /// The number.
         value: f64,
-        /// Digits after the point.
+        /// Number of decimals.
         decimals: usize,
     },
     /// A verdict in a word or two, with the reason below.
     Verdict {
-        /// Its colour.
+        /// Colour of the verdict.
         tone: Tone,
         /// The verdict.
         text: String,
@@ -54,7 +54,7 @@ pub enum Cell {
         done: usize,
         /// Total number of steps.
         total: usize,
-        /// The last step's name.
+        /// Name of the last step.
         label: String,
     },
 }
@@ -72,7 +72,7 @@ impl Cell {
         Self::Number { value, decimals }
     }
 
-    /// A dash: no value.
+    /// A dash, for a missing value.
     #[must_use]
     pub fn missing() -> Self {
         Self::Number { value: f64::NAN, decimals: 0 }
@@ -108,12 +108,12 @@ impl Cell {
     }
 }
 
-/// Text in a table cell: on one line, with escaped bars.
+/// Text for a table cell: on one line, with escaped bars.
 fn escape_markdown(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
 }
 
-/// A column: its heading, its unit, and its group heading.
+/// A column: its heading, unit and group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     heading: String,
@@ -135,14 +135,14 @@ impl Column {
         Self { numeric: true, ..Self::text(heading) }
     }
 
-    /// The same column with a unit beside its heading.
+    /// Adds a unit beside the heading.
     #[must_use]
     pub fn unit(mut self, unit: impl Into<String>) -> Self {
         self.unit = Some(unit.into());
         self
     }
 
-    /// The same column in a group; neighbours in the same group share its heading.
+    /// Puts the column into a group; neighbours in the same group have a common heading.
     #[must_use]
     pub fn group(mut self, group: impl Into<String>) -> Self {
         self.group = Some(group.into());
@@ -160,7 +160,7 @@ impl Column {
     }
 }
 
-/// Rows under headed columns.
+/// Rows below headed columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     caption: Option<String>,
@@ -176,7 +176,7 @@ impl Table {
         Self { caption: None, columns, rows: Vec::new(), summary: None }
     }
 
-    /// Text under the table.
+    /// Sets the text below the table.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = Some(caption.into());
@@ -194,7 +194,7 @@ impl Table {
         self
     }
 
-    /// Sets the last row, separated from the others: medians, totals.
+    /// Sets the last row, which is separated from the others: medians or totals.
     ///
     /// # Panics
     /// If the number of cells differs from the number of columns.
@@ -210,7 +210,7 @@ impl Table {
     }
 
     pub(crate) fn to_html(&self) -> String {
-        // The box scrolls horizontally on a small screen; tabindex makes it scrollable by keyboard.
+        // The element scrolls horizontally on a small screen; tabindex makes it scrollable by keyboard.
         let mut html = String::from("<figure class=\"table\"><div class=\"scroll\" tabindex=\"0\"><table><thead>");
         if self.columns.iter().any(|column| column.group.is_some()) {
             html += "<tr class=\"groups\">";
@@ -251,7 +251,7 @@ impl Table {
         html + "</figure>"
     }
 
-    /// The table as Markdown, with its caption below. The heading of a grouped column contains both headings.
+    /// The table as Markdown, with its caption below. The heading of a grouped column contains the group's heading.
     #[must_use]
     pub fn to_markdown(&self) -> String {
         let headings: Vec<String> = self.columns.iter().map(Column::to_markdown).collect();

@@ -4,11 +4,11 @@ use nalgebra::{Point2, Point3};
 
 use crate::error::CalibrationError;
 
-/// Squares of the pattern of dots in each direction, more than any board has.
+/// Number of squares of the dot pattern along each side, more than any board has.
 pub(crate) const PATTERN_SIDE: u32 = 32;
-/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Drawn at random; the first pattern of 100 s of
-/// draws in which on 9 × 6 squares any two windows of 3 × 3 differ, and any two of 4 × 4 differ in at least four
-/// squares, at every turn (the test below).
+/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Random; of 100 seeds, the first for which, on 9
+/// × 6 squares, any two windows of 3 × 3 squares differ at every rotation, and any two of 4 × 4 differ in at least four
+/// squares (tested below).
 const PATTERN: [u32; PATTERN_SIDE as usize] = pattern(13);
 
 const fn pattern(seed: u64) -> [u32; PATTERN_SIDE as usize] {
@@ -16,7 +16,7 @@ const fn pattern(seed: u64) -> [u32; PATTERN_SIDE as usize] {
     let mut state = seed;
     let mut row = 0;
     while row < rows.len() {
-        // SplitMix64 (Steele, Lea, Flood 2014), its upper half.
+        // SplitMix64 (Steele, Lea, Flood 2014); the upper half of its output.
         state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut bits = state;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -36,11 +36,11 @@ pub struct Board {
 }
 
 impl Board {
-    /// Minimum and maximum number of squares in a direction: four have three by three corners between them.
+    /// Minimum and maximum number of squares along a side: four squares have three corners between them.
     pub const SIDES: [u32; 2] = [4, 30];
-    /// A dot's radius in sides of a square. The neighbourhood of a saddle point, up to 0.45 sides, is free of it.
+    /// Radius of a dot, in sides of a square. Dots stay outside the neighbourhoods of saddle points, up to 0.45 sides.
     pub const DOT_RADIUS: f64 = 0.17;
-    /// Shortest and longest side of a square, metres: from a board under a microscope to one on a wall.
+    /// Minimum and maximum side of a square, in metres: from a board under a microscope to one on a wall.
     const SQUARES_M: [f64; 2] = [0.0005, 0.5];
 
     /// A board of `columns` × `rows` squares with sides of `square_m` metres.
@@ -58,25 +58,25 @@ impl Board {
         Ok(Self { columns, rows, square_m })
     }
 
-    /// Squares along x.
+    /// Number of squares along x.
     pub fn columns(&self) -> u32 {
         self.columns
     }
 
-    /// Squares along y.
+    /// Number of squares along y.
     pub fn rows(&self) -> u32 {
         self.rows
     }
 
-    /// A square's side in metres.
+    /// Side of a square, in metres.
     pub fn square_m(&self) -> f64 {
         self.square_m
     }
 
-    /// The same board from a printer that prints 100 mm as `measured_mm`.
+    /// The board as printed by a printer that prints 100 mm as `measured_mm`.
     ///
     /// # Errors
-    /// [`CalibrationError::Ruler`]: no printer has an error of more than a tenth.
+    /// [`CalibrationError::Ruler`] for a deviation of more than a tenth, which no printer has.
     pub fn as_printed(&self, measured_mm: f64) -> Result<Self, CalibrationError> {
         if !(90.0..=110.0).contains(&measured_mm) {
             return Err(CalibrationError::Ruler { measured_mm });
@@ -84,7 +84,7 @@ impl Board {
         Ok(Self { square_m: self.square_m * measured_mm / 100.0, ..*self })
     }
 
-    /// The position of a corner, in metres of the board's frame.
+    /// The position of a corner in the board's frame, in metres.
     pub fn corner(&self, [i, j]: [u32; 2]) -> Point3<f64> {
         Point3::new(f64::from(i) * self.square_m, f64::from(j) * self.square_m, 0.0)
     }
@@ -100,7 +100,7 @@ impl Board {
         ((self.columns - 1) * (self.rows - 1)) as usize
     }
 
-    /// The centre of the board in metres of its frame.
+    /// The centre of the board in its frame, in metres.
     pub fn center(&self) -> Point2<f64> {
         Point2::new(f64::from(self.columns), f64::from(self.rows)) * (0.5 * self.square_m)
     }
@@ -133,7 +133,7 @@ impl Board {
 mod tests {
     use super::*;
 
-    /// The colours and dots of `side` × `side` squares at a place and turn.
+    /// The colours and dots of a window of `side` × `side` squares, at a position and a rotation by quarters.
     fn window(side: u32, [column, row]: [u32; 2], turn: u32) -> Vec<(bool, bool)> {
         let places = (0..side).flat_map(|y| (0..side).map(move |x| (x, y)));
         let turned = places.map(|(x, y)| match turn {
@@ -151,7 +151,7 @@ mod tests {
             .flat_map(|place| (0..4).map(move |turn| window(side, place, turn)))
             .collect();
         let pairs = windows.iter().enumerate().flat_map(|(k, a)| windows[k + 1..].iter().map(move |b| (a, b)));
-        // Windows with different colours of squares cannot be confused.
+        // Only windows with the same colours of squares can be confused.
         let alike = pairs.filter(|(a, b)| a[0].0 == b[0].0);
         alike.map(|(a, b)| a.iter().zip(b).filter(|(a, b)| a.1 != b.1).count()).min().unwrap()
     }
@@ -169,7 +169,7 @@ mod tests {
         assert!(!board.is_inked(&Point2::new(-0.01, 0.01)) && !board.is_inked(&Point2::new(9.01, 5.9)));
         assert_eq!(board.corner([8, 5]), Point3::new(0.2, 0.125, 0.0));
         assert_eq!(board.corners().count(), board.num_corners());
-        // A dot has the other colour: the ink at its centre differs from the ink beside it.
+        // A dot has the opposite colour of its square: the ink differs between its centre and the square around it.
         let (column, row) = (0..54).map(|k| (k % 9, k / 9)).find(|(x, y)| Board::has_dot(*x, *y)).unwrap();
         let [x, y] = [column, row].map(|k| f64::from(k) + 0.5);
         assert_ne!(board.is_inked(&Point2::new(x, y)), board.is_inked(&Point2::new(x + 0.2, y)));

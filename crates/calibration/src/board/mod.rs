@@ -6,9 +6,9 @@
 //!   │   ■ □ ■ □        Corner [i, j] lies at (i, j) · square_m.
 //!   └──────────→ x     The origin is the outer corner of square (0, 0); z points out of the sheet, towards the reader.
 //! ```
-//! Some squares have a dot of the other colour in their middle. The pattern of dots is the same on every board of any
-//! size, and differs between any two places and turns with three by three visible squares. A board that the picture
-//! cuts off is therefore still identified, and boards of 9 × 6 and 8 × 6 squares cannot be confused.
+//! Some squares have a dot of the opposite colour in their centre. The pattern of dots is the same on boards of every
+//! size, and any two windows of three by three squares differ at every rotation. A board is therefore identified even
+//! if it is partly outside the picture, and boards of 9 × 6 and 8 × 6 squares cannot be confused.
 
 mod checkerboard;
 mod sheet;

@@ -1,14 +1,14 @@
-//! The board on paper, as SVG and as PDF.
+//! The printed board, as SVG and as PDF.
 //!
-//! Legend: millimetres from the lower left of the paper, y up. Both files contain the same shapes; SVG's y points down
-//! and is converted on writing. Beside the board are its data and a line of 100 mm for a ruler.
+//! Units: millimetres from the lower left of the paper, y up. Both files contain the same shapes; for SVG, whose y
+//! points down, y is converted. Below the board are its data and a line of 100 mm for checking with a ruler.
 
 use std::fmt::Write;
 
 use super::checkerboard::Board;
 use crate::error::CalibrationError;
 
-/// A sheet's size, wider than high.
+/// A paper size, in landscape format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Paper {
     /// 297 × 210 mm.
@@ -32,7 +32,7 @@ impl Paper {
         }
     }
 
-    /// The name on the command line.
+    /// The name of the option value.
     pub fn name(self) -> &'static str {
         match self {
             Self::A4 => "a4",
@@ -42,11 +42,11 @@ impl Paper {
     }
 }
 
-/// Margin that no office printer reaches, at each side.
+/// Margin at each side that office printers cannot print on.
 const MARGIN_MM: f64 = 8.0;
-/// White below the board and its data.
+/// Height of the area below the board for its data.
 const FOOTER_MM: f64 = 30.0;
-/// Length of the printed line by which a ruler checks the print's scale.
+/// Length of the printed line for checking the scale with a ruler.
 const RULER_MM: f64 = 100.0;
 const MM_PER_INCH: f64 = 25.4;
 const POINTS_PER_INCH: f64 = 72.0;
@@ -61,16 +61,16 @@ pub struct Sheet {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Shape {
-    /// Lower left corner, width, height.
+    /// A filled rectangle: lower left corner, width and height, in mm.
     Rectangle { x: f64, y: f64, width: f64, height: f64 },
     /// A filled circle, in mm.
     Disc { x: f64, y: f64, radius: f64, is_dark: bool },
-    /// Text, from its lower left corner.
+    /// Text from its lower left corner; size in mm.
     Text { x: f64, y: f64, size: f64, text: String },
 }
 
 impl Sheet {
-    /// The longest side of squares that fit on the paper, in whole 5 mm.
+    /// The largest side of squares that fit on the paper, in steps of 5 mm.
     ///
     /// # Errors
     /// [`CalibrationError::Paper`] if not even 5 mm fit.
@@ -84,7 +84,7 @@ impl Sheet {
         Ok(whole / 1000.0)
     }
 
-    /// Lays a board out.
+    /// Places a board on the paper.
     ///
     /// # Errors
     /// [`CalibrationError::Paper`] if it does not fit.
@@ -99,7 +99,7 @@ impl Sheet {
             return Err(CalibrationError::Paper { paper: paper.name(), columns, rows, square_mm: square, fits_mm });
         }
         let left = 0.5 * (paper_width - width);
-        // The remaining white is divided above and below the board.
+        // The remaining space is divided equally above and below the board.
         let bottom = FOOTER_MM + 0.5 * (paper_height - MARGIN_MM - FOOTER_MM - height);
         let mut shapes = Vec::new();
         let squares = || (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
@@ -116,7 +116,7 @@ impl Sheet {
         Ok(Self { board, paper, shapes })
     }
 
-    /// `sdg-board squares=9x6 square_mm=25 paper=a4`: the description in both files.
+    /// The board's description in both files, such as `sdg-board squares=9x6 square_mm=25 paper=a4`.
     pub fn facts(&self) -> String {
         let (columns, rows, square_m) = (self.board.columns(), self.board.rows(), self.board.square_m());
         format!(
@@ -126,10 +126,10 @@ impl Sheet {
         )
     }
 
-    /// The board in a file of [`Self::to_svg`] or [`Self::to_pdf`].
+    /// Reads the board from a file of [`Self::to_svg`] or [`Self::to_pdf`].
     ///
     /// # Errors
-    /// [`CalibrationError::NoBoardFile`] if the file does not contain it.
+    /// [`CalibrationError::NoBoardFile`] if the file does not contain the description.
     pub fn board_of(file: &str) -> Result<Board, CalibrationError> {
         let facts =
             file.split_once("sdg-board squares=").map(|(_, facts)| facts).ok_or(CalibrationError::NoBoardFile)?;
@@ -176,7 +176,7 @@ impl Sheet {
         svg
     }
 
-    /// The sheet as PDF 1.7, one page, which asks viewers not to scale it.
+    /// The sheet as PDF 1.7 of one page, with the request to viewers not to scale it.
     pub fn to_pdf(&self) -> Vec<u8> {
         let [width, height] = self.paper.size_mm().map(|side| side * POINTS_PER_INCH / MM_PER_INCH);
         let content = self.pdf_content();
@@ -199,7 +199,7 @@ impl Sheet {
             let _ = write!(pdf, "{} 0 obj\n{object}\nendobj\n", k + 1);
         }
         let (start, size) = (pdf.len(), objects.len() + 1);
-        // Each line of the table has 20 bytes.
+        // Each entry of the table has 20 bytes.
         let _ = write!(pdf, "xref\n0 {size}\n0000000000 65535 f \n");
         for offset in offsets {
             let _ = writeln!(pdf, "{offset:010} 00000 n ");
@@ -234,7 +234,7 @@ impl Sheet {
     }
 }
 
-/// Available width and height of a board.
+/// Maximum width and height of a board.
 fn room_mm(paper: Paper) -> [f64; 2] {
     let [width, height] = paper.size_mm();
     [width - 2.0 * MARGIN_MM, height - MARGIN_MM - FOOTER_MM]
@@ -242,7 +242,7 @@ fn room_mm(paper: Paper) -> [f64; 2] {
 
 fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
     let (columns, rows, square_m) = (board.columns(), board.rows(), board.square_m());
-    // The white between the line and the board must be wide enough that the outer squares' corners stay clear.
+    // The space between the line and the board must leave the outer squares' corners clear.
     let line = bottom - 12.0;
     let mut text = |x: f64, y: f64, size: f64, text: String| shapes.push(Shape::Text { x, y, size, text });
     text(left, bottom - 6.0, 3.5, "Origin: the corner above. x to the right, y upwards.".to_owned());
@@ -258,7 +258,7 @@ fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
     );
     text(left, line - 8.0, 3.5, facts);
     shapes.push(Shape::Rectangle { x: left, y: line - 0.15, width: RULER_MM, height: 0.3 });
-    // The ticks end at the line's ends: a ruler measures from outer edge to outer edge.
+    // The ticks are inside the line's length: a ruler measures from outer edge to outer edge.
     for x in [left, left + RULER_MM - 0.3] {
         shapes.push(Shape::Rectangle { x, y: line - 2.0, width: 0.3, height: 4.0 });
     }
@@ -281,7 +281,7 @@ fn pdf_circle(x: f64, y: f64, radius: f64) -> String {
     format!("{start} m{}", curves.concat())
 }
 
-/// A number to a ten-thousandth, without trailing zeros.
+/// A number with at most four decimals, without trailing zeros.
 fn trimmed(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -308,7 +308,7 @@ mod tests {
             })
             .collect();
         assert_eq!(squares.len(), 27);
-        // 297 mm less nine squares is 72 mm: 36 mm at each side.
+        // 297 mm minus nine squares is 72 mm: 36 mm at each side.
         assert_eq!(squares[0].0, 36.0);
         assert_eq!(squares.last().unwrap().0 - squares[0].0, 7.0 * 25.0);
         assert_eq!(squares.last().unwrap().1 - squares[0].1, 5.0 * 25.0);

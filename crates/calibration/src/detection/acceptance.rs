@@ -1,5 +1,5 @@
-//! Whether the corners of a grid belong to a board: they lie on a plane, and brightness differs between squares but not
-//! within.
+//! Whether the corners of a grid belong to a board: they lie on a plane, and brightness varies between squares but not
+//! within a square.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,15 @@ use super::seen_corner::SeenCorner;
 use crate::board::Board;
 use crate::homography;
 
-/// Largest root mean square distance of corners from a homography, in sides of a square. For the boards in this crate's
-/// tests the lenses with the strongest distortion give 0.08, grids in photos of wood, metal and cloth at least 0.13.
+/// Largest root mean square distance of corners from a homography, in sides of a square. Among the boards in this
+/// crate's tests, the lenses with the strongest distortion give 0.08; grids in photos of wood, metal and cloth give at
+/// least 0.13.
 const MAX_OFF: f64 = 0.12;
-/// Largest variation of brightness within a square divided by the difference to its neighbours: medians over all
-/// squares. The boards of the tests have at most 0.03 (dark, noisy), grids in such photos at least 0.7.
+/// Largest variation of brightness within a square, divided by the difference to its neighbours: medians over all
+/// squares. The boards of the tests have at most 0.03 (dark, noisy), grids in photos of wood, metal and cloth at least
+/// 0.7.
 const MAX_VARIATION: f64 = 0.35;
-/// Sample points of a square's own colour, in sides of the square: outside a dot, inside the edges.
+/// Sample points of a square's own colour, in sides of the square: outside a dot and inside the edges.
 const RING: [[f64; 2]; 8] =
     [[0.27, 0.27], [0.73, 0.27], [0.27, 0.73], [0.73, 0.73], [0.18, 0.5], [0.82, 0.5], [0.5, 0.18], [0.5, 0.82]];
 
@@ -31,7 +33,7 @@ fn place([i, j]: [u32; 2]) -> Point2<f64> {
     Point2::new(f64::from(i), f64::from(j))
 }
 
-/// Distance from a homography, root mean square, in sides of a square.
+/// Root mean square distance of the corners from a homography, in sides of a square.
 fn off(corners: &[SeenCorner]) -> Option<f64> {
     let places: Vec<_> = corners.iter().map(|seen| (place(seen.corner), seen.pixel)).collect();
     let homography = homography::fit(&places)?;
@@ -57,7 +59,7 @@ fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
         let samples: Vec<f64> = samples.collect::<Option<_>>()?;
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
         let variance = samples.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / samples.len() as f64;
-        // Dark squares must be darker.
+        // The sign makes the difference positive if dark squares are darker than light ones.
         let sign = if Board::is_dark(i, j) { -1.0 } else { 1.0 };
         Some(([i, j], (mean, variance.sqrt(), sign)))
     });

@@ -9,29 +9,30 @@ use super::luminance::Luminance;
 use crate::board::{Board, PATTERN_SIDE};
 use crate::error::CalibrationError;
 
-/// A grid's placement on the board: the board's corner `[i, j]` for each place of the grid.
+/// A grid's placement on the board: the board's corner `[i, j]` for each position of the grid.
 pub(super) type Placed = BTreeMap<Place, [u32; 2]>;
 
-/// The presence of a dot, from 0 to 1, for the square between `[i, j]` and `[i + 1, j + 1]`.
+/// The dot of the square between `[i, j]` and `[i + 1, j + 1]`: 0 for absent, 1 for present.
 type Dots = BTreeMap<Place, f64>;
 
-/// Largest share of the squares that may contradict the board, because of shadows or glare.
+/// Largest fraction of the squares that may contradict the board, because of shadows or glare.
 const MAX_CONTRADICTION: f64 = 0.2;
-/// Number of squares by which the second best placement must be worse. Windows of four by four squares differ in at
-/// least four.
+/// Number of contradicting squares by which the second best placement must exceed the best. Windows of four by four
+/// squares differ in at least four.
 const MIN_MARGIN: f64 = 1.5;
-/// Number of corners that may lie outside the board, found in its surroundings.
+/// Number of found corners that may lie outside the board.
 const MAX_OUTSIDE: usize = 2;
-/// Below it no square has a dot: a plain checkerboard.
+/// If every square's value is below this one, the board is a plain checkerboard.
 const MAX_PLAIN: f64 = 0.3;
-/// Sample points of a square's own colour, in sides of the square from its centre: outside a dot, inside the edges.
+/// Distance of the sample points of a square's own colour from its centre, in sides: outside a dot and inside the
+/// edges.
 const RING: f64 = 0.32;
 
 /// Finds the grid's placement on the board.
 ///
 /// # Errors
-/// [`CalibrationError::BoardUnclear`] if several or none fit, [`CalibrationError::OtherBoard`] if a larger board fits,
-/// [`CalibrationError::OtherCheckerboard`] if one without dots has other squares.
+/// [`CalibrationError::BoardUnclear`] if no placement or several fit, [`CalibrationError::OtherBoard`] if a larger
+/// board fits, [`CalibrationError::OtherCheckerboard`] if a grid without dots has a different number of squares.
 pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Result<Placed, CalibrationError> {
     let dots = read(picture, grid);
     if let Some(placed) = place(grid, &dots, [board.columns(), board.rows()]) {
@@ -57,7 +58,7 @@ pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Resul
 /// The reason why a grid without dots is not the whole board.
 fn other_checkerboard(grid: &Grid, board: &Board) -> CalibrationError {
     let [columns, rows] = [board.columns(), board.rows()];
-    // With the longer side as that of the board.
+    // The longer side is compared with the board's longer side.
     let mut found = grid.extent().map(|corners| corners as u32 + 1);
     found.sort_unstable();
     if columns >= rows {
@@ -121,7 +122,7 @@ fn within(&[a, b, c, d]: &[Point2<f64>; 4], [u, v]: [f64; 2]) -> Point2<f64> {
     Point2::from(lower * (1.0 - v) + upper * v)
 }
 
-/// The only placement on a board of this many squares that agrees with the dots.
+/// The placement on a board of this many squares, if only one agrees with the dots.
 fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     let mut placements: Vec<(f64, Turned)> = Turned::all(grid, sides)
         .filter(|turned| turned.agrees_in_color(grid))
@@ -134,8 +135,8 @@ fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     is_clear.then(|| turned.corners(grid, sides))
 }
 
-/// A board without dots and the same board after half a turn differ only by colours, and only if the board is
-/// completely visible.
+/// The placement of a board without dots, which must be completely visible. The colours of the squares
+/// distinguish it from the same board rotated by 180 degrees.
 fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     let sides = [board.columns(), board.rows()];
     if grid.len() != board.num_corners() {
@@ -147,7 +148,7 @@ fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     whole.next().is_none().then(|| first.corners(grid, sides))
 }
 
-/// A turn by quarters, then a shift: from a grid's places to the board's corners.
+/// A rotation by quarters and a shift: from a grid's positions to the board's corners.
 #[derive(Debug, Clone, Copy)]
 struct Turned {
     quarters: i32,
@@ -155,7 +156,7 @@ struct Turned {
 }
 
 impl Turned {
-    /// Every placement with at most [`MAX_OUTSIDE`] rows or columns outside.
+    /// All placements with at most [`MAX_OUTSIDE`] rows or columns outside the board.
     fn all(grid: &Grid, [columns, rows]: [u32; 2]) -> impl Iterator<Item = Self> {
         (0..4).flat_map(move |quarters| {
             let turned = Self { quarters, shift: [0, 0] };
@@ -163,7 +164,7 @@ impl Turned {
             let ranges = [(0, columns), (1, rows)].map(|(axis, side)| {
                 let along = || places.iter().map(|place| place[axis]);
                 let (low, high) = (along().min().unwrap_or_default(), along().max().unwrap_or_default());
-                // Corners go from 1 to side - 1.
+                // Corners are numbered from 1 to side - 1.
                 -low..=side as i32 - high
             });
             let [across, along] = ranges;

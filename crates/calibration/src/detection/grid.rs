@@ -1,7 +1,7 @@
-//! From saddle points to a grid, grown from one of them, neighbour by neighbour.
+//! Grows a grid from one saddle point, neighbour by neighbour.
 //!
-//! Legend: a grid's places `[i, j]` count from the first saddle point, and may be negative. The steps along `i` and `j`
-//! have the orientation of the board's x and y as seen from its printed side: `j` is to the left of `i` (y of pixels
+//! Legend: a grid's positions `[i, j]` count from the first saddle point, and may be negative. The axes `i` and `j`
+//! have the same orientation as the board's x and y seen from its printed side: `j` is to the left of `i` (y of pixels
 //! points down).
 
 use std::collections::{BTreeMap, VecDeque};
@@ -13,23 +13,23 @@ use super::saddle::Saddle;
 /// Column and row in a grid.
 pub(super) type Place = [i32; 2];
 
-/// The four neighbours of a place, and the axis of each.
+/// The four neighbours of a position: offset, axis and sign.
 const NEIGHBOURS: [(Place, usize, f64); 4] =
     [([1, 0], 0, 1.0), ([-1, 0], 0, -1.0), ([0, 1], 1, 1.0), ([0, -1], 1, -1.0)];
-/// Largest distance of a neighbour from the prediction of the last step, in steps: perspective shortens steps by up to
-/// a sixth.
+/// Largest distance of a neighbour from the position predicted by the last step, in steps. Perspective shortens steps
+/// by up to a sixth.
 const MAX_OFF: f64 = 0.3;
 /// Largest deviation of the first neighbours from the edges' directions: the sine of 14 degrees.
 const MAX_SINE: f64 = 0.25;
-/// Minimum strength of a neighbour relative to a corner's: light decreases along a board, but not abruptly.
+/// Minimum strength of a neighbour relative to a corner's. Light decreases along a board, but not abruptly.
 const MIN_STRENGTH: f64 = 0.05;
-/// Number of corners from which grids are grown: the strongest that are not yet in a grid.
+/// Maximum number of saddle points from which grids are grown: the strongest that are not yet in a grid.
 const MAX_SEEDS: usize = 60;
 
 /// Corners in a grid.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Grid {
-    /// Their positions in the picture.
+    /// Positions in the picture, in pixels.
     pub(super) corners: BTreeMap<Place, Point2<f64>>,
     /// Whether the square between `[0, 0]` and `[1, 1]` is dark.
     pub(super) first_is_dark: bool,
@@ -40,7 +40,7 @@ impl Grid {
         self.corners.len()
     }
 
-    /// Corners along both axes.
+    /// Number of corners along both axes.
     pub(super) fn extent(&self) -> [usize; 2] {
         [0, 1].map(|axis| {
             let along = || self.corners.keys().map(|place| place[axis]);
@@ -51,13 +51,13 @@ impl Grid {
         })
     }
 
-    /// The same grid in a picture `factor` times as large.
+    /// The grid in a picture `factor` times as large.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         let corners = self.corners.iter().map(|(place, pixel)| (*place, pixel * factor)).collect();
         Self { corners, ..*self }
     }
 
-    /// Minimum width of the squares around a corner, in pixels: from an edge to the opposite one.
+    /// Minimum width of the squares around a corner, in pixels: the distance between opposite edges.
     pub(super) fn width(&self, place: Place) -> Option<f64> {
         let ways = |axis: usize| {
             let of_axis = NEIGHBOURS.iter().filter(move |(_, of, _)| *of == axis);
@@ -67,8 +67,8 @@ impl Grid {
         widths.min_by(f64::total_cmp)
     }
 
-    /// From a corner to its neighbour. Beyond the grid's border, at the board's outer squares, extrapolated with
-    /// perspective: from the last two steps and their ratio.
+    /// The vector from a corner to its neighbour. Beyond the grid's border it is extrapolated with perspective, from
+    /// the last two steps and their ratio.
     fn way(&self, [i, j]: Place, [di, dj]: Place) -> Option<Vector2<f64>> {
         let at = |steps: i32| self.corners.get(&[i + steps * di, j + steps * dj]);
         let here = at(0)?;
@@ -118,14 +118,14 @@ struct Growth<'a> {
 }
 
 impl<'a> Growth<'a> {
-    /// From a saddle point that has a neighbour along each edge.
+    /// Starts at a saddle point that has a neighbour along each edge.
     fn start(saddles: &'a [Saddle], seed: usize) -> Option<Self> {
         let first = &saddles[seed];
         let step = |edge: Vector2<f64>| {
             let ways = saddles.iter().filter(|other| is_neighbour(first, other)).map(|other| other.place - first.place);
             let along = ways.filter(|way| way.perp(&edge).abs() < MAX_SINE * way.norm() && way.norm() > 0.0);
             let nearest = along.min_by(|a, b| a.norm().total_cmp(&b.norm()))?;
-            // Along the edge's direction, so that both steps are known to have the same orientation.
+            // The step points along the edge's direction, so that the orientation of both steps is known.
             Some(if nearest.dot(&edge) < 0.0 { -nearest } else { nearest })
         };
         let [edge, other_edge] = first.edges();
@@ -171,7 +171,7 @@ impl<'a> Growth<'a> {
         self.members
     }
 
-    /// The step to the next place: that of the last step along this axis, or that of the neighbouring row.
+    /// The step to the next position: the last step along this axis, or the step of the neighbouring row.
     fn step(&self, [i, j]: Place, axis: usize, sign: f64) -> Vector2<f64> {
         let [along, across] = if axis == 0 { [[1, 0], [0, 1]] } else { [[0, 1], [1, 0]] };
         let sign_i = sign as i32;
@@ -194,7 +194,8 @@ fn is_neighbour(first: &Saddle, other: &Saddle) -> bool {
 fn grid(saddles: &[Saddle], members: &BTreeMap<Place, usize>) -> Grid {
     let corners: BTreeMap<Place, Point2<f64>> = members.iter().map(|(place, k)| (*place, saddles[*k].place)).collect();
     let mut grid = Grid { corners, first_is_dark: false };
-    // At each corner of a dark square brightness decreases towards the square's centre; squares alternate.
+    // From each corner of a dark square, brightness decreases towards the square's centre. The corners vote, with
+    // alternating sign for alternating squares.
     let mut votes = 0;
     for (place, k) in members {
         let Some([here, .., opposite]) = grid.square(*place) else { continue };

@@ -1,9 +1,9 @@
-//! A picture's brightness as numbers, smoothed, halved and sampled.
+//! The brightness of a picture: smoothing, halving and sampling.
 
 use image::GrayImage;
 use nalgebra::Point2;
 
-/// Brightness 0 to 255, row by row.
+/// Brightness from 0 to 255, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Luminance {
     pub(super) width: usize,
@@ -22,12 +22,12 @@ impl Luminance {
         self.width.max(self.height) as u32
     }
 
-    /// Value at a pixel.
+    /// The value of a pixel.
     pub(super) fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }
 
-    /// Between pixels, whose first centre is at (0.5, 0.5); `None` outside the picture.
+    /// Bilinear interpolation; the first pixel's centre is at (0.5, 0.5). `None` outside the picture.
     pub(super) fn sample(&self, place: &Point2<f64>) -> Option<f64> {
         let (width, height) = (self.width as f64, self.height as f64);
         if !((0.0..width).contains(&place.x) && (0.0..height).contains(&place.y)) {
@@ -43,7 +43,7 @@ impl Luminance {
         Some(upper * (1.0 - v) + lower * v)
     }
 
-    /// Two by two pixels to one: positions in pixels are halved exactly.
+    /// The mean of each two by two pixels; positions in pixels are halved exactly.
     pub(super) fn halved(&self) -> Self {
         let [width, height] = [self.width / 2, self.height / 2];
         let mut values = Vec::with_capacity(width * height);

@@ -1,12 +1,12 @@
-//! The board in a picture: corners to a fraction of a pixel, each with its position on the board.
+//! Finds the board in a picture: corners with subpixel accuracy, each with its position on the board.
 //!
 //! ```text
 //! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
-//!         ─ dots read, place and turn on the board ─ corners refined at full resolution                dots.rs, refine.rs
-//!         ─ refused where corners are no plane's or squares not even                                   acceptance.rs
+//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution         dots.rs, refine.rs
+//!         ─ rejected if the corners are not in a plane or the squares are unequal                      acceptance.rs
 //! ```
-//! A grid is extended from its last steps, so that distortion and perspective need not be known. Pixels have the first
-//! pixel's centre at (0.5, 0.5).
+//! A grid is extended from its last steps, so that distortion and perspective need not be known. The first pixel's
+//! centre is at (0.5, 0.5).
 
 mod acceptance;
 mod dots;
@@ -26,13 +26,13 @@ use crate::error::CalibrationError;
 
 /// Minimum number of corners of a usable board: three by three.
 pub const MIN_CORNERS: usize = 9;
-/// Pictures are halved as long as their longer side stays at least this: in a blurred picture the corners are found
-/// only at low resolution.
+/// Pictures are halved as long as their longer side stays at least this: corners of a blurred picture are only found at
+/// low resolution.
 const MIN_SIDE: u32 = 160;
-/// Larger pictures are first searched at half size: smoothing there does not hide sharp corners of large squares.
+/// Larger pictures are first searched at half size: there, smoothing does not hide the sharp corners of large squares.
 const MAX_SIDE: u32 = 2000;
 
-/// Finds the board, completely or partly visible.
+/// Finds the board, which may be partly outside the picture.
 ///
 /// # Units and frames
 /// Pixels with the first centre at (0.5, 0.5); corners in [`Board`]'s order, row by row.
@@ -67,7 +67,7 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
                         found = corners;
                     }
                 }
-                // The error of the first sufficiently large grid is the most informative: later ones are parts of it.
+                // The error of the first sufficiently large grid is the most informative: later grids are parts of it.
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }

@@ -1,8 +1,8 @@
-//! Corners to a fraction of a pixel.
+//! Refines corners to subpixel accuracy.
 //!
-//! Legend: `g` a brightness gradient at pixel `p`, `q` the corner, `w` a Gaussian weight. On both edges, and in the
-//! squares, where `g = 0`, the gradient is perpendicular to the vector from the corner: `gᵀ (p - q) = 0`. Least squares
-//! over a window give `q = (Σ w g gᵀ)⁻¹ Σ w g gᵀ p`.
+//! Legend: `g` a brightness gradient at pixel `p`, `q` the corner, `w` a Gaussian weight. On both edges the gradient is
+//! perpendicular to the vector from the corner, and inside the squares `g = 0`: everywhere `gᵀ (p - q) = 0`. Least
+//! squares over a window give `q = (Σ w g gᵀ)⁻¹ Σ w g gᵀ p`.
 //!
 //! # Source
 //! Förstner and Gülch 1987; OpenCV's `cornerSubPix` minimises the same sum over a square window.
@@ -14,11 +14,12 @@ use super::grid::Grid;
 use super::luminance::Luminance;
 use super::seen_corner::SeenCorner;
 
-/// The window's radius in sides of a square: it contains neither the next edge nor a dot.
+/// Radius of the window, in sides of a square: the window contains neither the next edge nor a dot.
 const WINDOW: f64 = 0.38;
-/// Its limits in pixels: smaller windows have too few gradients, larger ones include the lens's curvature.
+/// Minimum and maximum radius of the window, in pixels: smaller windows have too few gradients, larger ones include the
+/// lens's curvature.
 const WINDOWS_PX: [f64; 2] = [2.5, 24.0];
-/// The weight's standard deviation in radii of the window.
+/// Standard deviation of the weight, in radii of the window.
 const SIGMA: f64 = 0.5;
 const MAX_STEPS: usize = 30;
 /// Step size at which the iteration ends, in pixels.
@@ -26,7 +27,8 @@ const TOLERANCE_PX: f64 = 1e-3;
 /// Largest movement of a corner from its position in the grid, in sides of a square.
 const MAX_MOVE: f64 = 0.3;
 
-/// The grid's corners on the board, refined; those without a clear corner, or near the picture's border, are left out.
+/// The refined corners of the grid, with their positions on the board. Corners that are unclear or near the picture's
+/// border are left out.
 pub(super) fn refine(picture: &Luminance, grid: &Grid, placed: &Placed) -> Vec<SeenCorner> {
     let refined = placed.iter().filter_map(|(place, corner)| {
         let side = grid.width(*place)?;
@@ -53,7 +55,7 @@ fn corner_near(picture: &Luminance, start: Point2<f64>, radius: f64) -> Option<P
 fn step(picture: &Luminance, corner: &Point2<f64>, radius: f64) -> Option<Point2<f64>> {
     let [left, top] = [corner.x - radius, corner.y - radius].map(|value| (value - 0.5).ceil());
     let [right, bottom] = [corner.x + radius, corner.y + radius].map(|value| (value - 0.5).floor());
-    // Gradients need a pixel at each side.
+    // The gradient at a pixel needs a neighbour on each side.
     if left < 1.0 || top < 1.0 || right + 1.0 >= picture.width as f64 || bottom + 1.0 >= picture.height as f64 {
         return None;
     }

@@ -1,7 +1,7 @@
-//! Saddle points of brightness: the meeting points of four squares.
+//! Saddle points of brightness: the points where four squares meet.
 //!
-//! Legend: `H` the second derivatives of the smoothed brightness. At a corner brightness is, up to a factor, the product of the
-//! signed distances to both edges: `det H < 0`, and the edges are the directions `d` with `dᵀ H d = 0`.
+//! Legend: `H` the second derivatives of the smoothed brightness. Near a corner, brightness is proportional to the
+//! product of the signed distances to both edges: `det H < 0`, and the edges are the directions `d` with `dᵀ H d = 0`.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -10,29 +10,30 @@ use super::luminance::Luminance;
 /// A saddle point.
 #[derive(Debug, Clone)]
 pub(super) struct Saddle {
-    /// Position, exact to about a pixel.
+    /// Position, accurate to about a pixel.
     pub(super) place: Point2<f64>,
     pub(super) hessian: Matrix2<f64>,
     /// `-det H`, positive at a saddle.
     pub(super) strength: f64,
 }
 
-/// Smoothing before derivatives: it removes noise, and corners of squares of six pixels stay separate.
+/// Standard deviation of the smoothing before derivatives, in pixels: it removes noise, and corners of squares of six
+/// pixels stay separate.
 const SIGMA: f64 = 1.5;
-/// Minimum contrast between dark and light squares, of 255. A tenth of that of a board in the dark.
+/// Minimum contrast between dark and light squares, in grey levels: a tenth of a board's contrast in the dark.
 const MIN_CONTRAST: f64 = 10.0;
-/// Largest ratio of the two curvatures: a noisy edge is not a corner. Squares seen at 70 degrees have 3.
+/// Largest ratio of the two curvatures, which excludes noisy edges. It is 3 for squares seen at 70 degrees.
 const MAX_CURVATURE_RATIO: f64 = 8.0;
-/// Distance at which brightness is compared with the opposite side, in pixels: beyond the smoothing, within squares of
-/// six pixels.
+/// Distance at which brightness is compared with the opposite side, in pixels: larger than the smoothing, and within
+/// squares of six pixels.
 const RING_PX: f64 = 4.0;
 const RING_PLACES: usize = 24;
-/// Largest difference of brightness from the opposite side, relative to its other variation. It is 0 where four squares
-/// meet, and 2 for a dark square's corner on white, which is also a saddle point.
+/// Maximum of the squared differences of opposite points on the ring, relative to the squared variation that they have
+/// in common. 0 where four squares meet, and 2 at the corner of a dark square on white, which is also a saddle point.
 const MAX_ASYMMETRY: f64 = 0.5;
-/// Neighbours that must be weaker than a saddle point.
+/// Radius, in pixels, within which a saddle point must be the strongest.
 const RADIUS: usize = 2;
-/// Maximum number of kept points, the strongest; no board has half as many corners.
+/// Maximum number of saddle points, the strongest ones; no board has half as many corners.
 const MAX_SADDLES: usize = 2000;
 
 /// The saddle points of a picture, strongest first.
@@ -49,7 +50,7 @@ pub(super) fn find(picture: &Luminance) -> Vec<Saddle> {
             strengths[y * width + x] = -hessian(&smooth, x, y).determinant() as f32;
         }
     }
-    // A corner of contrast c, smoothed, has off-diagonal curvature c / (π σ²).
+    // A smoothed corner of contrast c has the off-diagonal curvature c / (π σ²).
     let least = (MIN_CONTRAST / (std::f64::consts::PI * SIGMA * SIGMA)).powi(2) as f32;
     let mut found = Vec::new();
     for y in border..height - border {
@@ -76,18 +77,20 @@ pub(super) fn find(picture: &Luminance) -> Vec<Saddle> {
 }
 
 impl Saddle {
-    /// Directions of both edges.
+    /// The directions of both edges.
     pub(super) fn edges(&self) -> [Vector2<f64>; 2] {
-        // Along the eigenvectors e and f the form is a s² + b t² with a b < 0: it vanishes at t = ± s √(-a / b).
+        // Along the eigenvectors e and f the form is a s² + b t² with a b < 0: it is zero at t = ± s √(-a / b).
         let eigen = self.hessian.symmetric_eigen();
         let slope = (-eigen.eigenvalues[0] / eigen.eigenvalues[1]).max(0.0).sqrt();
         let (e, f) = (eigen.eigenvectors.column(0).into_owned(), eigen.eigenvectors.column(1).into_owned());
         [(e + f * slope).normalize(), (e - f * slope).normalize()]
     }
 
-    /// Whether dark and light squares are exchanged between two corners, as they are between neighbours along an edge.
+    /// Whether dark and light squares are exchanged between two corners, which is the case for neighbours along an
+    /// edge.
     pub(super) fn is_opposite(&self, other: &Self) -> bool {
-        // The trace of the product of both forms' traceless parts: 1 for equal forms, -1 for a quarter turn.
+        // The trace of the product of the traceless parts of both forms: 1 for equal forms, -1 for forms rotated by 90
+        // degrees.
         let traceless = |m: &Matrix2<f64>| (m - Matrix2::identity() * (0.5 * m.trace())).normalize();
         traceless(&self.hessian).dot(&traceless(&other.hessian)) < 0.0
     }
@@ -100,7 +103,7 @@ fn hessian(smooth: &Luminance, x: usize, y: usize) -> Matrix2<f64> {
     Matrix2::new(at(2, 1) - middle + at(0, 1), xy, xy, at(1, 2) - middle + at(1, 0))
 }
 
-/// From a pixel's centre to the zero of the gradient, at most a pixel.
+/// The step from a pixel's centre to the zero of the gradient, at most a pixel.
 fn newton_step(smooth: &Luminance, hessian: &Matrix2<f64>, x: usize, y: usize) -> Vector2<f64> {
     let difference = |a: f32, b: f32| 0.5 * f64::from(a - b);
     let gradient = Vector2::new(
@@ -111,7 +114,7 @@ fn newton_step(smooth: &Luminance, hessian: &Matrix2<f64>, x: usize, y: usize) -
     step * (1.0 / step.norm()).min(1.0)
 }
 
-/// Whether brightness around a point equals that on the opposite side.
+/// Whether brightness around a point equals the brightness on the opposite side.
 fn is_symmetric(smooth: &Luminance, place: &Point2<f64>) -> bool {
     let half = RING_PLACES / 2;
     let ring: Option<Vec<f64>> = (0..RING_PLACES)
@@ -132,7 +135,7 @@ fn is_symmetric(smooth: &Luminance, place: &Point2<f64>) -> bool {
 fn is_strongest(strengths: &[f32], width: usize, x: usize, y: usize) -> bool {
     let strength = strengths[y * width + x];
     (y - RADIUS..=y + RADIUS).all(|row| {
-        // Of two equal ones the first in reading order is kept.
+        // Of two equal neighbours, the first in reading order is kept.
         (x - RADIUS..=x + RADIUS).all(|column| {
             let other = strengths[row * width + column];
             if (row, column) < (y, x) { other < strength } else { other <= strength }

@@ -1,5 +1,4 @@
-//! Reprojection over all pictures as a function of `X`, `Y` and the board's scale, and of the errors of each robot
-//! pose.
+//! Reprojection over all pictures, as a function of `X`, `Y`, the board's scale and the error of each robot pose.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 use sdg_geometry::{Mount, PinholeCamera};
@@ -9,9 +8,9 @@ use crate::board::Board;
 use crate::least_squares::{Block, Problem};
 use crate::projection::{by_twist, motion, off, project};
 
-/// The twelve small motions of `X` and `Y`, and the board's scale.
+/// Number of shared parameters: small motions of `X` and `Y` (six each), and the board's scale.
 pub(super) const NUM_SHARED: usize = 13;
-/// The board's scale among them.
+/// Index of the board's scale.
 pub(super) const SCALE: usize = 12;
 
 #[derive(Debug, Clone)]
@@ -20,16 +19,16 @@ pub(super) struct Bundle<'a> {
     board: Board,
     mount: Mount,
     views: Vec<&'a HandEyeView>,
-    /// `A_i`, the flange's motions.
+    /// The motion `A_i` of the flange for each picture.
     motions: Vec<Isometry3<f64>>,
     pub(super) x: Isometry3<f64>,
     pub(super) y: Isometry3<f64>,
-    /// The board's size as a multiple of the given one; `Y` is followed by the scaled board.
+    /// The board's size as a multiple of the given one. `Y` is applied after this scale.
     pub(super) board_scale: f64,
     is_scale_free: bool,
-    /// The error of each pose: a small motion in the flange's frame.
+    /// The error of each robot pose: a small motion in the flange's frame.
     errors: Vec<Isometry3<f64>>,
-    /// Metres and radians of robot error with the weight of a pixel; `None` if poses are exact.
+    /// Robot errors, in metres and radians, that have the weight of one pixel; `None` if robot poses are exact.
     robot_sigma: Option<[f64; 2]>,
 }
 
@@ -58,12 +57,12 @@ impl<'a> Bundle<'a> {
         }
     }
 
-    /// The same with the board's scale as a free parameter, which is otherwise fixed.
+    /// A copy in which the board's scale, otherwise fixed, is a free parameter.
     pub(super) fn with_free_scale(&self, board_scale: f64) -> Self {
         Self { board_scale, is_scale_free: true, ..self.clone() }
     }
 
-    /// The same with robot errors of this many metres and radians per pixel.
+    /// A copy with robot errors of `sigma` metres and radians per pixel.
     pub(super) fn with_robot_sigma(&self, sigma: [f64; 2]) -> Self {
         Self { robot_sigma: Some(sigma), ..self.clone() }
     }
@@ -72,7 +71,7 @@ impl<'a> Bundle<'a> {
         self.views.len()
     }
 
-    /// The same without one picture.
+    /// A copy without one picture.
     pub(super) fn without(&self, view: usize) -> Self {
         let mut fewer = self.clone();
         fewer.views.remove(view);
@@ -81,12 +80,12 @@ impl<'a> Bundle<'a> {
         fewer
     }
 
-    /// RMS of each picture, with the given robot poses.
+    /// RMS error of each picture, with the given robot poses.
     pub(super) fn rms_of_pictures(&self) -> Vec<f64> {
         (0..self.views.len()).map(|k| (self.square(k) / self.views[k].corners.len() as f64).sqrt()).collect()
     }
 
-    /// RMS over all, with the given robot poses.
+    /// RMS error over all pictures, with the given robot poses.
     pub(super) fn rms_px(&self) -> f64 {
         let count: usize = self.views.iter().map(|view| view.corners.len()).sum();
         ((0..self.views.len()).map(|k| self.square(k)).sum::<f64>() / count as f64).sqrt()
@@ -106,7 +105,8 @@ impl<'a> Bundle<'a> {
         let mut block = Block::empty();
         let camera_from_x = self.x.inverse();
         let (motion, error) = (&self.motions[view], &self.errors[view]);
-        // For a camera on the hand the flange is on the camera's side of A, otherwise on the board's side.
+        // With the camera on the hand, the flange's error applies on the camera's side of A; otherwise on the board's
+        // side.
         let (camera_from_flange, flange_from_y) = match self.mount {
             Mount::Hand => (camera_from_x, *motion),
             Mount::Base => (camera_from_x * motion, Isometry3::identity()),
@@ -121,7 +121,7 @@ impl<'a> Bundle<'a> {
             let p = camera_from_flange * in_flange;
             let projected = project(&self.camera, &p)?;
             let mut by_shared = SMatrix::<f64, 2, NUM_SHARED>::zeros();
-            // X and Y are followed by their small motions: X⁻¹ is preceded by the inverse.
+            // The small motions apply after X and Y; X⁻¹ is therefore preceded by the inverse motion.
             by_shared.fixed_view_mut::<2, 6>(0, 0).copy_from(&-(projected.by_point * by_twist(&p)));
             by_shared.fixed_view_mut::<2, 6>(0, 6).copy_from(&(projected.by_point * turn_of_y * by_twist(&b)));
             by_shared.fixed_view_mut::<2, 1>(0, SCALE).copy_from(&(projected.by_point * turn_of_y * told.coords));
@@ -140,7 +140,7 @@ impl<'a> Bundle<'a> {
                 let weights = Matrix6::from_diagonal(&Vector6::from(scales));
                 block.add(&(weights * twist), &SMatrix::zeros(), &weights, 1.0);
             }
-            // Nothing depends on them.
+            // No residual depends on the robot's errors.
             None => block.own = Matrix6::identity(),
         }
         block.cost.is_finite().then_some(block)

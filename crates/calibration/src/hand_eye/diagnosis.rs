@@ -1,12 +1,12 @@
-//! Robot poses that contradict the pictures: finds the error that explains it.
+//! Robot poses that contradict the pictures: finds the mistake that explains the contradiction.
 //!
 //! ```text
-//! robot errors small, board's size as given ─ no question
-//!   ├─ board's size a parameter: falls the robot's error by much, and is the size another? ─ OtherBoardScale
-//!   └─ robot errors suspect ─ other readings of all poses    readings.rs, euler.rs ─ HandEyeDisagrees
-//!                           ─ a few poses wrong, exchanged   mixed_up.rs           ─ WrongPoses
+//! robot errors small, board's size as given ─ accepted
+//!   ├─ board's size estimated too: much smaller robot errors with another size ─ OtherBoardScale
+//!   └─ robot errors too large ─ all poses read in another way    readings.rs, euler.rs ─ HandEyeDisagrees
+//!                             ─ a few poses wrong or exchanged   mixed_up.rs           ─ WrongPoses
 //! ```
-//! Of several explanations the one with the smallest residual is used; among equal ones, the simplest.
+//! Of several explanations, the one with the smallest residual is used; among equal ones, the simplest.
 
 use nalgebra::Isometry3;
 
@@ -16,35 +16,36 @@ use super::readings;
 use super::solve::{Evidence, MAX_ROBOT_SCALE, SUSPECT_ROBOT_SCALE, Solved};
 use crate::error::CalibrationError;
 
-/// Largest share of the reprojection error at which another reading explains the pictures.
+/// Largest fraction of the reprojection error that may remain with another reading of the poses.
 const MAX_SHARE: f64 = 0.3;
-/// Largest share of the error that remains without a few wrong poses: three quarters of the squared error are theirs.
+/// Largest fraction of the error that may remain without a few wrong poses, which then cause three quarters of the
+/// squared error.
 const MAX_SHARE_OF_FEW: f64 = 0.5;
 /// Largest residual of an explanation beyond the corners' own errors, in radians of the picture: 5 px at a focal length
-/// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees has as much.
+/// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees causes as much.
 const MAX_RESIDUAL_RAD: f64 = 0.007;
-/// Largest residual of the closed form before the minimum is searched, which takes long if there is none: robot errors
-/// with [`MAX_RESIDUAL_RAD`] have a fifth of it between two pictures.
+/// Largest residual of the closed form for which the minimum is searched; the search takes long if there is no minimum.
+/// Robot errors of [`MAX_RESIDUAL_RAD`] cause a fifth of it between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
 /// Ratio of two explanations' residuals up to which they count as equal.
 const ALIKE: f64 = 1.2;
-/// A difference that is not visible in corners, in pixels.
+/// Difference that is not measurable in corners, in pixels.
 const ALIKE_PX: f64 = 0.02;
-/// A smaller error of the board's size is ignored: it is the reading error of a ruler on a line of 100 mm.
+/// Minimum relative error of the board's size; a smaller one is the reading error of a ruler on a line of 100 mm.
 const MIN_SCALE_ERROR: f64 = 0.003;
 /// Minimum error of the board's size, in standard errors.
 const MIN_SCALE_SIGMAS: f64 = 5.0;
-/// Number of remaining equations below which the standard error itself is uncertain: four pictures leave 11, and it
-/// counts three times.
+/// Number of remaining equations below which the standard error itself is uncertain, so that more standard errors are
+/// required: with four pictures, which leave 11 equations, three times as many.
 const FEW_EQUATIONS: f64 = 30.0;
-/// Largest remaining share of the robot's errors at which the board's size explains them: a quarter of the squared
-/// error is due to the size.
+/// Largest fraction of the robot's errors that may remain with another size of the board, which then causes a quarter
+/// of the squared error.
 const MAX_ROBOT_SHARE: f64 = 0.85;
-/// Largest difference between the robot's and the board's turns between two pictures, radians: 3 degrees, twice
+/// Largest difference between the rotations of robot and board between two pictures, in radians: 3 degrees, twice
 /// [`MAX_ROBOT_SCALE`].
 const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
-/// An explanation, and its residual.
+/// An explanation and its residual.
 struct Explanation {
     rms_px: f64,
     kind: Kind,
@@ -57,18 +58,18 @@ enum Kind {
         is_other_mount: bool,
     },
     MixedUp(MixedUp),
-    /// The board's size as a multiple of the given one, and its standard error.
+    /// The board's size as a multiple of the given one, and the standard error of this factor.
     BoardScale([f64; 2]),
 }
 
-/// The solution, unless poses and pictures contradict each other or another explanation fits far better.
+/// The solution, unless poses and pictures contradict each other or another explanation fits much better.
 ///
 /// # Errors
-/// As [`super::calibrate_hand_eye`].
+/// The errors of [`super::calibrate_hand_eye`].
 pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> Result<Solved<'a>, CalibrationError> {
     let boards = evidence.boards();
     let turns = closed_form::check_turns(evidence.mount, &evidence.motions(robot));
-    // If the board also turns about only one axis, the poses are right but insufficient.
+    // If the board also rotates about only one axis, the poses are correct but insufficient.
     if turns.is_err() && closed_form::check_turns(evidence.mount, &boards).is_err() {
         turns.clone()?;
     }
@@ -86,7 +87,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     let best = simplest(explanations);
     let board_rms_px = evidence_rms_px(evidence);
     let found = if rms_px.is_finite() {
-        format!("{rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px")
+        format!("a reprojection error of {rms_px:.1} px, compared with {board_rms_px:.2} px without the robot poses")
     } else {
         "no pose of the camera that explains both".to_owned()
     };
@@ -106,8 +107,8 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     }
 }
 
-/// Readings of all poses and selections of a few, each if its residual is no larger than that of corners and a robot
-/// may be.
+/// Other readings of all poses, and exclusions or exchanges of a few. Each has a residual that errors of the corners
+/// and a robot can explain.
 fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<Explanation> {
     let readings = readings::plausible(evidence.mount, robot, &evidence.boards());
     let readings = readings.into_iter().filter_map(|reading| {
@@ -136,7 +137,7 @@ fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<
     readings.chain(mixed_up).filter(explains).collect()
 }
 
-/// Reprojection error with other robot poses; `None` if it is larger than corners and a robot may cause.
+/// Reprojection error with other robot poses; `None` if it is larger than errors of corners and a robot can explain.
 fn left_px(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<f64> {
     let motions = evidence.motions(robot);
     closed_form::check_turns(evidence.mount, &motions).ok()?;
@@ -154,9 +155,9 @@ fn is_little(evidence: &Evidence, rms_px: f64) -> bool {
     rms_px <= most
 }
 
-/// The board's size, if it differs from the given one and explains the robot's errors.
+/// Another size of the board, if it differs from the given one and explains the robot's errors.
 fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&Solved>) -> Option<Explanation> {
-    // The squared error decreases by the share of the robot's errors that the size explains: a cheap check before the
+    // The squared error decreases by the fraction of the robot's errors that the size explains: a fast check before the
     // full minimisation.
     let promises =
         |solved: &Solved| solved.gain_of_free_scale() > 0.5 * (1.0 - MAX_ROBOT_SHARE.powi(2)) * solved.freedom;
@@ -168,7 +169,8 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
     let off = (scale - 1.0).abs();
     let noise = solved.map_or(f64::INFINITY, Solved::robot_noise);
     let rms_px = free.minimum.at.rms_px();
-    // A robot's noise may leave more than a reading may: if it is accepted with the given board, it is accepted here.
+    // With another size of the board, the same robot errors are accepted as with the given size, even if they exceed
+    // the limit for other readings.
     let is_accepted = noise <= MAX_ROBOT_SCALE || is_little(evidence, rms_px);
     let explains = free.robot_noise() < (MAX_ROBOT_SHARE * noise).min(MAX_ROBOT_SCALE) && is_accepted;
     let min_sigmas = MIN_SCALE_SIGMAS * (1.0 + (FEW_EQUATIONS / free.freedom).powi(2)).sqrt();
@@ -176,9 +178,9 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
         .then_some(Explanation { rms_px, kind: Kind::BoardScale([scale, sigma]) })
 }
 
-/// The first of those with the smallest residual; they are sorted, the simplest first.
+/// The first explanation whose residual counts as the smallest. The explanations are sorted, the simplest first.
 fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
-    // Without both of two exchanged pictures the others also agree.
+    // Without both exchanged pictures the others also agree.
     let exchanged = explanations.iter().find_map(|explanation| match explanation.kind {
         Kind::MixedUp(MixedUp::Exchanged(two)) => Some(MixedUp::Wrong(two.to_vec())),
         _ => None,
@@ -194,7 +196,7 @@ fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
 fn refusal(kind: Kind, left_px: f64, found: String, evidence: &Evidence) -> CalibrationError {
     match kind {
         Kind::Reading { name, is_other_mount } => {
-            let hint = format!(": {name}, which leaves {left_px:.2} px");
+            let hint = format!(": {name}; with this reading, the reprojection error is {left_px:.2} px");
             CalibrationError::HandEyeDisagrees { found, hint, is_other_mount }
         }
         Kind::MixedUp(MixedUp::Wrong(pictures)) => {
@@ -222,7 +224,7 @@ fn evidence_rms_px(evidence: &Evidence) -> f64 {
     (squares / num as f64).sqrt()
 }
 
-/// The hint if the robot turns by other angles than the board: no error in translations explains it.
+/// The hint for a robot that rotates by other angles than the board, which no error in translations explains.
 fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<String> {
     let boards = evidence.boards();
     let turn = |poses: &[Isometry3<f64>], k: usize| poses[k].rotation.angle_to(&poses[k - 1].rotation);
@@ -231,8 +233,8 @@ fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<St
     let [robot_turn, board_turn] = *turns.get(turns.len() / 2)?;
     ((robot_turn - board_turn).abs() > MAX_TURN_DIFFERENCE_RAD).then(|| {
         format!(
-            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the \
-             board turns by {:.0}): check that each picture is listed with its own pose, and how the rotations were \
+            "between pictures the flange rotates by other angles than the board (typically by {:.0} degrees instead \
+             of {:.0}): check that each picture is listed with its own pose, and how the rotations were \
              made (order of Euler angles, degrees or radians)",
             robot_turn.to_degrees(),
             board_turn.to_degrees()

@@ -1,8 +1,8 @@
-//! Rotations decomposed into three angles and composed in another way.
+//! Rotations that are decomposed into three angles and composed in another way.
 //!
-//! Legend: a rotation is composed as `R_k(a) · R_l(b) · R_m(c)`, `k`, `l`, `m` axes (0 is x). Turns about fixed axes
-//! are the same product read from the right, so that the six orders of three axes cover intrinsic and extrinsic turns.
-//! Angles in radians.
+//! Legend: a rotation is composed as `R_k(a) · R_l(b) · R_m(c)`, where `k`, `l`, `m` are axes (0 is x). Rotations about
+//! fixed axes are the same product read from the right, so the six orders of three axes cover intrinsic and extrinsic
+//! angles. Angles are in radians.
 
 use std::f64::consts::PI;
 
@@ -13,25 +13,25 @@ pub(super) const ORDERS: [[usize; 3]; 6] = [[2, 1, 0], [0, 1, 2], [0, 2, 1], [1,
 /// Orders with equal first and last axes (proper Euler angles); ZYZ are the O, A, T angles of several robots.
 const PROPER: [[usize; 3]; 6] = [[2, 1, 2], [2, 0, 2], [0, 1, 0], [0, 2, 0], [1, 0, 1], [1, 2, 1]];
 
-/// Number of earlier pictures that decide between the two possible rotations.
+/// Number of previous pictures that decide between the two possible rotations.
 const NUM_BEFORE: usize = 2;
 
-/// How three angles make a rotation.
+/// A rule that makes a rotation from three angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Composition {
-    /// The factors' axes from left to right, and the index of the angle that each takes.
+    /// A product of rotations: the axes of the factors from left to right, and the index of each factor's angle.
     Product { axes: [usize; 3], angles: [usize; 3] },
-    /// Axis times angle, with these angles along x, y and z.
+    /// A rotation vector (axis times angle): the indices of the angles along x, y and z.
     RotationVector { angles: [usize; 3] },
 }
 
 impl Composition {
-    /// The usual decomposition of a rotation: each factor takes the angle at its position.
+    /// The usual decomposition of a rotation: each factor takes the angle at its own position.
     pub(super) fn in_order(axes: [usize; 3]) -> Self {
         Self::Product { axes, angles: [0, 1, 2] }
     }
 
-    /// The rotation from three angles.
+    /// The rotation that three angles describe.
     fn rotation(self, values: &[f64; 3]) -> UnitQuaternion<f64> {
         match self {
             Self::Product { axes, angles } => {
@@ -48,10 +48,10 @@ impl Composition {
         }
     }
 
-    /// The angles of a rotation: with the middle one within a quarter turn, and beyond.
+    /// Both sets of angles of a rotation: with the middle angle within 90 degrees, and beyond.
     fn angles(self, rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 2] {
         match self {
-            // Only for the product in order, because rotations are decomposed in no other way.
+            // Only products in order are decomposed.
             Self::Product { axes: [k, l, m], .. } => {
                 let matrix: Rotation3<f64> = rotation.to_rotation_matrix();
                 let sign = if (k + 1) % 3 == l { 1.0 } else { -1.0 };
@@ -63,7 +63,7 @@ impl Composition {
             Self::RotationVector { .. } => {
                 let vector = rotation.scaled_axis();
                 let angle = vector.norm();
-                // The same turn in the other direction.
+                // The same rotation, in the opposite direction.
                 let far = if angle > 0.0 { vector * (1.0 - 2.0 * PI / angle) } else { vector };
                 [vector.into(), far.into()]
             }
@@ -87,24 +87,25 @@ impl Composition {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A rotation that was composed in one way from angles that were meant in another.
+/// A rotation whose angles were read with one composition but meant for another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Recomposition {
     pub(super) composed: Composition,
     pub(super) meant: Composition,
-    /// The angles' factor: radians that were taken for degrees are larger by the factor 180 / π.
+    /// Factor of the angles: 180 / π for radians that were read as degrees.
     pub(super) unit: f64,
 }
 
 impl Recomposition {
-    /// The rotations that may have been meant: one rotation has two sets of three angles.
+    /// The two rotations that may have been meant: a rotation has two sets of three angles.
     fn meant(&self, rotation: &UnitQuaternion<f64>) -> [UnitQuaternion<f64>; 2] {
         let of_both = self.composed.angles(rotation);
         of_both.map(|values| self.meant.rotation(&values.map(|value| self.unit * value)))
     }
 
-    /// The rotations that were meant, starting from each of the first picture's two: of each further picture's two, the
-    /// one that turns as the board did since the two pictures before. `turns` gives this turn between pictures.
+    /// The intended rotations, one candidate for each of the first picture's two. Of each further picture's two, the
+    /// one is taken whose rotation since the two previous pictures agrees with the board's. `turns` returns the board's
+    /// rotation between two pictures.
     pub(super) fn apply(
         &self,
         rotations: &[UnitQuaternion<f64>],
@@ -124,13 +125,13 @@ impl Recomposition {
         meant
     }
 
-    /// All tried combinations with one unit of angles, the more likely ones first: another order of the same turns
-    /// about x, y and z; angles that belong to other axes; rotation vectors; proper Euler angles.
+    /// All combinations that are tried for one unit of angles, the more likely ones first: other orders of the
+    /// rotations about x, y and z; angles that belong to other axes; rotation vectors; proper Euler angles.
     pub(super) fn all(unit: f64) -> Vec<Self> {
         let mut all = Vec::new();
         let mut add = |composed, meant| all.push(Self { composed, meant, unit });
         let composed = ORDERS.map(|axes| (axes, Composition::in_order(axes)));
-        // An angle's position is that of its axis in the order of composition.
+        // An angle's index is the index of its axis in the order of composition.
         let place = |order: [usize; 3], axis: usize| order.iter().position(|of| *of == axis).unwrap_or_default();
         for (order, from) in composed {
             for axes in ORDERS {
@@ -164,7 +165,7 @@ impl Recomposition {
     }
 }
 
-/// An angle within half a turn of 0.
+/// The angle, wrapped to within π of 0.
 fn wrapped(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
@@ -193,7 +194,7 @@ mod tests {
 
     #[test]
     fn turns_about_x_then_y_then_z_of_the_fixed_frame_are_the_product_from_the_right() {
-        // Rz(90°)·Rx(90°) first takes y to z, which the turn about z does not change.
+        // Rz(90°)·Rx(90°) first maps y to z, which the rotation about z does not change.
         let composition = Composition::Product { axes: [2, 1, 0], angles: [2, 1, 0] };
         let turned = composition.rotation(&[FRAC_PI_2, 0.0, FRAC_PI_2]) * Vector3::y();
         assert!((turned - Vector3::z()).norm() < 1e-12);
@@ -202,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_tool_that_points_down_is_recomposed_although_the_angle_about_x_is_beyond_a_quarter_turn() {
-        // Composed as Ry·Rx·Rz, whose middle angle is that about x; meant as Rz·Ry·Rx.
+        // Read as Ry·Rx·Rz, whose middle angle is about x; meant as Rz·Ry·Rx.
         let about = [3.0, 0.2, 0.7];
         let composed = Composition::in_order([1, 0, 2]).rotation(&[about[1], about[0], about[2]]);
         let meant = Composition::in_order([2, 1, 0]).rotation(&[about[2], about[1], about[0]]);
@@ -213,7 +214,7 @@ mod tests {
         };
         let off = recomposition.meant(&composed).map(|found| found.angle_to(&meant));
         assert!(off[0] > 0.1 && off[1] < 1e-7, "{off:?}");
-        // The first is given; of the second the turn since then.
+        // The first rotation is given; for the second, the rotation since then is.
         let turns = |_: usize, _: usize| 0.0;
         let found = recomposition.apply(&[composed; 2], 1, &turns);
         assert!(found.iter().all(|found| found.angle_to(&meant) < 1e-7));

@@ -6,25 +6,24 @@ use super::closed_form::{self, BoardSize};
 use super::solve::Evidence;
 use super::view::MIN_POSES;
 
-/// The error in the poses of a few pictures.
+/// The mistake in the poses of a few pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum MixedUp {
-    /// These are wrong.
+    /// The poses of these pictures are wrong.
     Wrong(Vec<usize>),
-    /// These two are exchanged.
+    /// The poses of these two pictures are exchanged.
     Exchanged([usize; 2]),
 }
 
-/// Largest share of the closed form's residual that the remaining poses may have.
+/// Largest fraction of the closed form's residual that may remain.
 const MAX_SHARE: f64 = 0.5;
-/// Another choice with a residual below this many times as much is equally good: then it is unknown which pose is
-/// wrong.
+/// Ratio of residuals below which another choice is equally plausible, so that the wrong pose is unknown.
 const MIN_AMBIGUITY: f64 = 2.0;
-/// Minimum numbers of pictures for naming one, and two: with fewer the others agree by chance if the robot is merely
-/// inaccurate.
+/// Minimum numbers of pictures for naming one wrong pose, and two. With fewer, the other poses agree by chance if the
+/// robot is merely inaccurate.
 const MIN_FOR_ONE: usize = MIN_POSES + 2;
 const MIN_FOR_TWO: usize = MIN_POSES + 4;
-/// With more pictures not every pair is tried, only the worst picture with each other.
+/// With more pictures, not every pair is tried, only the pairs that include the worst picture.
 const MAX_ALL_PAIRS: usize = 30;
 
 /// The most plausible choice of each kind, the simplest kind first.
@@ -66,7 +65,7 @@ pub(super) fn plausible(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Vec<Mi
     found
 }
 
-/// The choice with a clearly smaller residual than all others, and than the given poses.
+/// The choice whose residual is clearly smaller than all others and than that of the given poses.
 fn clearest<T>(mut choices: Vec<(f64, T)>, given: f64) -> Option<T> {
     choices.sort_by(|a, b| a.0.total_cmp(&b.0));
     let second = choices.get(1).map_or(f64::INFINITY, |(left, _)| *left);

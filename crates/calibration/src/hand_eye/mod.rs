@@ -1,6 +1,6 @@
-//! The camera's pose on the robot, or beside it, from robot poses and pictures of the board.
+//! The camera's pose on the robot's hand or beside the robot, from robot poses and pictures of the board.
 //!
-//! Legend, one equation for both mounts, picture `i`: `camera_from_board_i = X⁻¹ A_i Y`.
+//! Legend, with one equation for both mounts, for picture `i`: `camera_from_board_i = X⁻¹ A_i Y`.
 //!
 //! | | camera on the hand | camera beside the robot |
 //! |---|---|---|
@@ -10,11 +10,11 @@
 //!
 //! ```text
 //! boards' poses ─ A_ij X = X B_ij in closed form ─ reprojection over all pictures minimised in X and Y   closed_form.rs, bundle.rs
-//!               ─ robot poses that are off: their errors estimated with X and Y ─ one left out at a time
-//! poses that contradict the pictures ─ readings of all, a few that are wrong, the board's size        diagnosis.rs, readings.rs, mixed_up.rs
+//!               ─ inaccurate robot poses: their errors estimated with X and Y ─ one left out at a time
+//! poses that contradict the pictures ─ another reading of all, a few wrong ones, the board's size     diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
-//! A robot's pose has an error far above a pixel: 0.05 degrees at 0.5 m are 0.4 mm. If reprojection shows this, each
-//! pose gets six corrections, whose squares are weighted relative to those of the pixels.
+//! A robot's pose has an error far above a pixel: 0.05 degrees at 0.5 m are 0.4 mm. If the reprojection error shows
+//! this, each robot pose gets six corrections, whose squares are weighted relative to the squared pixels.
 
 mod bundle;
 mod closed_form;
@@ -46,24 +46,25 @@ pub struct HandEye {
     pub frame_from_board: Isometry3<f64>,
     /// Root of the expected squared distance of the camera from its true position, metres.
     pub sigma_m: f64,
-    /// Root of the expected squared angle, radians.
+    /// Root of the expected squared angular error, radians.
     pub sigma_rad: f64,
-    /// Reprojection with the given robot poses: root of the mean squared distance of corners.
+    /// Root of the mean squared distance of corners, with the given robot poses.
     pub rms_px: f64,
-    /// Reprojection if each picture has its own pose: the error of corners and intrinsics alone.
+    /// Root of the mean squared distance of corners if each picture has its own pose: the error of corners and
+    /// intrinsics alone.
     pub board_rms_px: f64,
-    /// The estimated errors of the robot's poses, if measurable: metres and radians along and about each axis. Their
-    /// ratio is assumed.
+    /// The estimated errors of the robot's poses, if measurable: in metres and radians, along and about each axis. The
+    /// ratio of the two is assumed.
     pub robot_sigma: Option<[f64; 2]>,
-    /// RMS of each picture with the given robot pose, in the given order.
+    /// RMS error of each picture with the given robot pose, in the given order.
     pub pictures_rms_px: Vec<f64>,
-    /// Movement of the camera when a picture is left out: metres and radians, in the given order.
+    /// Change of the camera's pose when a picture is left out: metres and radians, for each picture in the given order.
     pub spread: Vec<[f64; 2]>,
 }
 
 impl HandEye {
-    /// The camera with its pose: on the hand, or over the table. `table_height_m` is the table's z in the base; without
-    /// it, that of the camera's file or 0.
+    /// The camera with its pose, on the hand or above the table. `table_height_m` is the table's z in the base frame;
+    /// `None` keeps the height of the camera file, or 0.
     pub fn mounted(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
         match mount {
             Mount::Hand => CalibratedCamera { flange_from_camera: Some(self.frame_from_camera), ..camera },
@@ -81,10 +82,10 @@ impl HandEye {
     }
 }
 
-/// Finds the camera on the robot or beside it.
+/// Finds the pose of the camera on the hand or beside the robot.
 ///
 /// # Units and frames
-/// Pixels with the first centre at (0.5, 0.5), metres; frames as in the module's legend.
+/// Pixels with the first centre at (0.5, 0.5); metres; frames as in the module's legend.
 ///
 /// # Errors
 /// [`CalibrationError::TooFewPictures`], [`CalibrationError::TurnsAlike`], [`CalibrationError::HandEyeDisagrees`],

@@ -1,12 +1,12 @@
-//! Robot poses and the pictures taken there, as YAML, JSON or CSV.
+//! Robot poses with their pictures, as YAML, JSON or CSV.
 //!
 //! ```yaml
 //! poses:
 //!   - picture: 00.png
 //!     base_from_flange: {translation_m: [0.4, 0.0, 0.5], rotation_xyzw: [1.0, 0.0, 0.0, 0.0]}
 //! ```
-//! JSON has the same names. CSV has the header `picture,x,y,z,qx,qy,qz,qw`, lengths in metres; the fields may be
-//! separated by semicolons, tabs or blanks, numbers may have decimal commas, and lines that start with `#` are
+//! JSON has the same field names. CSV has the header `picture,x,y,z,qx,qy,qz,qw` and lengths in metres. Fields may be
+//! separated by commas, semicolons, tabs or blanks, numbers may have decimal commas, and lines that start with `#` are
 //! comments.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -17,9 +17,9 @@ use crate::error::CalibrationError;
 /// The robot's pose for a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotPose {
-    /// The picture's file.
+    /// The file name of the picture.
     pub picture: String,
-    /// Pose of the flange in the base frame; lengths in metres.
+    /// Pose of the flange in the base frame, lengths in metres.
     pub base_from_flange: Isometry3<f64>,
 }
 
@@ -40,13 +40,13 @@ struct Pose {
     rotation_xyzw: Vec<f64>,
 }
 
-/// Larger than any arm's reach, metres.
+/// Maximum distance of the flange from the base, in metres: larger than any arm's reach.
 const MAX_REACH_M: f64 = 5.0;
 /// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 const HEADER: &str = "picture,x,y,z,qx,qy,qz,qw";
 
-/// The format of a file.
+/// The format of a poses file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Csv,
@@ -55,7 +55,7 @@ enum Format {
 }
 
 impl Format {
-    /// By the first bytes if they are unambiguous, otherwise by the extension of the file's name.
+    /// The format, from the first bytes if they are unambiguous, otherwise from the extension of the file's name.
     fn of(name: &str, text: &str) -> Self {
         let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
@@ -71,7 +71,7 @@ impl Format {
     }
 }
 
-/// Whether a line of CSV contains a row: it is neither empty nor a comment.
+/// Whether a line of CSV is neither empty nor a comment.
 fn is_row(line: &str) -> bool {
     !line.trim().is_empty() && !line.trim_start().starts_with('#')
 }
@@ -79,7 +79,7 @@ fn is_row(line: &str) -> bool {
 /// Reads robot poses from the text of a file with this name.
 ///
 /// # Errors
-/// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for an invalid pose, or one in millimetres.
+/// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for an invalid pose or one in millimetres.
 pub fn read_robot_poses(name: &str, text: &str) -> Result<Vec<RobotPose>, CalibrationError> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     let entries = match Format::of(name, text) {
@@ -108,7 +108,7 @@ fn unreadable(found: String) -> CalibrationError {
 fn read_csv(text: &str) -> Result<Vec<Entry>, CalibrationError> {
     let mut rows = text.lines().map(str::trim).filter(|line| is_row(line));
     let header = rows.next().unwrap_or_default();
-    // Spreadsheets with decimal commas separate the fields by semicolons.
+    // Spreadsheets with decimal commas separate the fields with semicolons.
     let separator = [';', '\t', ','].into_iter().find(|separator| header.contains(*separator)).unwrap_or(' ');
     if !fields(header, separator).join(",").eq_ignore_ascii_case(HEADER) {
         return Err(unreadable(format!("as CSV, the header {header:?} instead of {HEADER}")));
@@ -124,7 +124,7 @@ fn entry_of_row(row: &str, separator: char) -> Result<Entry, CalibrationError> {
     let num_fields = HEADER.split(',').count();
     let mut fields = fields(row, separator);
     if fields.len() != num_fields {
-        // With decimal commas and commas between the fields, blanks distinguish them.
+        // If both decimals and fields use commas, blanks separate the fields.
         fields = row.split_whitespace().map(|field| field.trim_end_matches(separator)).collect();
     }
     let expected = || unreadable(format!("as CSV, the line {row:?}, expected {HEADER}"));

@@ -1,4 +1,4 @@
-//! Other interpretations of the given robot poses: frequent errors.
+//! Other readings of the given robot poses: frequent mistakes.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use sdg_geometry::Mount;
@@ -7,51 +7,55 @@ use super::closed_form;
 use super::euler::Recomposition;
 use super::view::motion;
 
-/// Robot poses as they may have been meant.
+/// Robot poses in another reading.
 pub(super) struct Reading {
     /// The reading in words, as part of a sentence.
     pub(super) name: String,
-    /// Whether the camera is then mounted at the other place than given.
+    /// Whether the reading implies the other mount: beside the robot instead of on the hand, or the reverse.
     pub(super) is_other_mount: bool,
     /// `base_from_flange` of each picture.
     pub(super) robot: Vec<Isometry3<f64>>,
 }
 
-/// A reading of one pose.
+/// The conversion of a given pose to the intended one.
 type OfPose = fn(&Isometry3<f64>) -> Isometry3<f64>;
 
-/// Errors other than Euler angles, the simplest first. A camera on the hand with inverted poses is a camera beside the
-/// robot: both have the same equation.
+/// Mistakes other than Euler angles, the simplest first. Poses of a camera on the hand, inverted, have the same
+/// equation as poses of a camera beside the robot.
 const READINGS: [(&str, bool, OfPose); 8] = [
-    ("rotation_xyzw seems to hold w first", false, w_first),
+    ("rotation_xyzw seems to have w first", false, w_first),
     ("the poses seem to be flange_from_base, or the mount to be the other one", true, Isometry3::inverse),
-    ("the rotations seem to be transposed (flange_from_base beside translations in the base)", false, transposed),
+    (
+        "the rotations seem to be transposed (flange_from_base, with translations of base_from_flange)",
+        false,
+        transposed,
+    ),
     ("the translations seem to be in millimetres", false, |pose| {
         Isometry3::from_parts((pose.translation.vector / 1000.0).into(), pose.rotation)
     }),
-    ("the translations seem to be those of flange_from_base beside rotations of base_from_flange", false, |pose| {
+    ("the translations seem to be those of flange_from_base, unlike the rotations", false, |pose| {
         Isometry3::from_parts((-(pose.rotation * pose.translation.vector)).into(), pose.rotation)
     }),
-    ("rotation_xyzw seems to hold w first, and the mount to be the other one", true, |pose| w_first(pose).inverse()),
-    ("rotation_xyzw seems to hold w first, and the rotations to be transposed", false, |pose| {
+    ("rotation_xyzw seems to have w first, and the mount to be the other one", true, |pose| w_first(pose).inverse()),
+    ("rotation_xyzw seems to have w first, and the rotations to be transposed", false, |pose| {
         transposed(&w_first(pose))
     }),
     ("the rotations seem to be transposed, and the mount to be the other one", true, |pose| transposed(pose).inverse()),
 ];
 
-/// Largest share of the closed form's residual with the given rotations that another reading of rotations may have.
+/// Largest fraction of the closed form's residual with the given rotations that may remain with other rotations.
 const MAX_TURNS_SHARE: f64 = 0.5;
-/// Number of readings of Euler angles with the smallest closed-form residuals that are evaluated further.
+/// Number of readings of Euler angles that are evaluated further: the ones with the smallest closed-form residuals.
 const NUM_EULER: usize = 3;
 /// Ratio of two readings' residuals up to which they count as equal.
 const ALIKE: f64 = 1.1;
-/// Below it all digits are rounding errors, radians.
+/// Residual below which all digits are rounding errors, in radians.
 const ROUNDING_RAD: f64 = 1e-5;
-/// If all rotations are smaller than this, they may be radians that were taken for degrees: half a turn about each axis
-/// is 3.14 "degrees".
+/// If all rotations are smaller than this, in radians, they may be radians that were read as degrees: half a rotation
+/// about each axis is then 3.14 "degrees".
 const MAX_TINY_RAD: f64 = 0.1;
 
-/// All readings whose rotations match those of the boards, the simplest first.
+/// All readings whose rotations match the board's, the simplest first.
 pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
     let left = |robot: &[Isometry3<f64>]| {
         let motions: Vec<_> = robot.iter().map(|pose| motion(mount, pose)).collect();
@@ -65,7 +69,7 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
             is_other_mount,
             robot: robot.iter().map(of_pose).collect(),
         })
-        // Those of translations do not change the rotations.
+        // Readings of translations leave the rotations unchanged, and so pass this filter.
         .filter(|reading| left(&reading.robot) <= given)
         .collect();
     let is_tiny = robot.iter().all(|pose| pose.rotation.angle() < MAX_TINY_RAD);
@@ -84,7 +88,7 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
         .filter(|(left, ..)| *left < MAX_TURNS_SHARE * given)
         .collect();
     let least = ways.iter().map(|(left, ..)| *left).fold(f64::INFINITY, f64::min);
-    // Among equal ones the more likely come first.
+    // Among equal residuals, the more likely reading comes first.
     ways.retain(|(left, ..)| *left <= ALIKE * least + ROUNDING_RAD);
     let likeliest = ways.iter().take(NUM_EULER);
     readings.extend(likeliest.map(|(_, way, first)| Reading {
@@ -96,28 +100,28 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
 }
 
 fn name(way: &Recomposition) -> String {
-    let unit = if way.unit > 1.0 { ", and their radians taken for degrees" } else { "" };
+    let unit = if way.unit > 1.0 { ", and their radians read as degrees" } else { "" };
     if way.composed == way.meant {
         return format!(
-            "the rotations seem to be composed of radians that were taken for degrees ({})",
+            "the rotations seem to be composed of radians that were read as degrees ({})",
             way.meant.formula()
         );
     }
     format!(
-        "the rotations seem to be composed as {} of angles that mean {}{unit}",
+        "the rotations seem to be composed as {} from angles meant for {}{unit}",
         way.composed.formula(),
         way.meant.formula()
     )
 }
 
-/// The pose whose quaternion was written w, x, y, z and read x, y, z, w.
+/// The pose whose quaternion was written in the order w, x, y, z and read as x, y, z, w.
 fn w_first(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let read = pose.rotation.coords;
     let rotation = UnitQuaternion::from_quaternion(Quaternion::new(read[0], read[1], read[2], read[3]));
     Isometry3::from_parts(pose.translation, rotation)
 }
 
-/// The pose whose rotation alone was inverted.
+/// The pose whose rotation was inverted, but not its translation.
 fn transposed(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(pose.translation, pose.rotation.inverse())
 }

@@ -1,4 +1,4 @@
-//! The minimum over all pictures, with the robot's errors if reprojection shows them.
+//! The minimum over all pictures; includes the robot's errors if the reprojection error shows them.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{Mount, PinholeCamera};
@@ -11,48 +11,48 @@ use crate::error::CalibrationError;
 use crate::least_squares::{Minimum, minimise};
 use crate::pose::BoardPose;
 
-/// Initially assumed errors of a robot along and about an axis, whose ratio is kept: metres and radians. The
-/// figures of issue 16 for an arm's noise.
+/// Initially assumed errors of a robot along and about an axis, in metres and radians; their ratio is kept. From issue
+/// 16, which gives the noise of an arm.
 pub(super) const ROBOT_SIGMA: [f64; 2] = [0.0001, 0.000_872_665];
-/// Ratio of the squared error to that expected for exact robot poses: 15 pictures have a deviation of 0.16.
+/// Largest ratio of the squared error to the squared error expected for exact robot poses. With 15 pictures this ratio
+/// has a standard deviation of 0.16.
 const MAX_EXCESS: f64 = 1.5;
-/// Robot errors, as multiples of the assumed ones, beyond which poses and pictures do not match: 3 mm and 1.5 degrees.
+/// Robot errors, as a multiple of [`ROBOT_SIGMA`], above which poses and pictures do not match: 3 mm and 1.5 degrees.
 pub(super) const MAX_ROBOT_SCALE: f64 = 30.0;
-/// Robot errors from which other readings of the poses are tried: 0.15 mm and 0.075 degrees. One pose of 15 with an
-/// error of 10 mm causes as much.
+/// Robot errors, as a multiple of [`ROBOT_SIGMA`], from which other readings of the poses are tried: 0.15 mm and 0.075
+/// degrees. One pose of 15 with an error of 10 mm causes as much.
 pub(super) const SUSPECT_ROBOT_SCALE: f64 = 1.5;
-/// Robot errors from which the search restarts if it found none.
+/// Robot errors, as multiples of [`ROBOT_SIGMA`], from which the search restarts if it found no minimum.
 const FURTHER_SCALES: [f64; 2] = [5.0, 25.0];
-/// It does not restart if the closed form's residual is larger, in radians: then poses and pictures do not match at
-/// all.
+/// Largest residual of the closed form, in radians, for a restart. Above it, poses and pictures do not match at all.
 const MAX_RETRY_RAD: f64 = 0.2;
-/// Minimum error of corners, in pixels.
+/// Assumed minimum error of corners, in pixels.
 const MIN_CORNER_SIGMA_PX: f64 = 0.02;
 
-/// Pictures, and their solution without the robot's poses.
+/// Pictures and the estimates that do not depend on the robot's poses.
 #[derive(Clone)]
 pub(super) struct Evidence<'a> {
     pub(super) camera: &'a PinholeCamera,
     pub(super) board: &'a Board,
     pub(super) mount: Mount,
     pub(super) views: Vec<&'a HandEyeView>,
-    /// The board's pose in each picture, from that picture alone.
+    /// The board's pose in each picture, estimated from that picture alone.
     pub(super) poses: Vec<&'a BoardPose>,
 }
 
-/// The minimum, and the estimated errors of the robot.
+/// The minimum and the estimated errors of the robot.
 pub(super) struct Solved<'a> {
     pub(super) minimum: Minimum<Bundle<'a>, NUM_SHARED>,
-    /// Multiples of [`ROBOT_SIGMA`]; `None` if robot poses count as exact.
+    /// Robot errors as a multiple of [`ROBOT_SIGMA`]; `None` if robot poses count as exact.
     pub(super) robot_scale: Option<f64>,
-    /// Equations minus parameters.
+    /// Number of equations minus number of parameters.
     pub(super) freedom: f64,
     corner_sigma_px: f64,
     pub(super) board_rms_px: f64,
 }
 
 impl<'a> Evidence<'a> {
-    /// Those of some of the pictures.
+    /// The evidence of some of the pictures.
     pub(super) fn of(&self, kept: &[usize]) -> Self {
         Self {
             views: kept.iter().map(|k| self.views[*k]).collect(),
@@ -66,7 +66,7 @@ impl<'a> Evidence<'a> {
         self.poses.iter().map(|pose| pose.camera_from_board).collect()
     }
 
-    /// `A_i` of robot poses.
+    /// The motion `A_i` for each robot pose.
     pub(super) fn motions(&self, robot: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
         robot.iter().map(|pose| motion(self.mount, pose)).collect()
     }
@@ -94,7 +94,7 @@ impl<'a> Solved<'a> {
             BoardSize::Free => (start.with_free_scale(closed.board_scale), 13),
         };
         let exact = minimise(start.clone()).ok_or(CalibrationError::NoPose)?;
-        // Each picture's six parameters are replaced by the common ones.
+        // The six parameters of each picture are replaced by the common ones.
         let freedom = (6 * views.len() - num_shared) as f64;
         let solved = |minimum, robot_scale| Self { minimum, robot_scale, freedom, corner_sigma_px, board_rms_px };
         let excess = |cost: f64| (cost - free_cost) / (corner_sigma_px * corner_sigma_px) / freedom;
@@ -105,8 +105,8 @@ impl<'a> Solved<'a> {
             let sigma = ROBOT_SIGMA.map(|sigma| scale * sigma / corner_sigma_px);
             minimise(from.with_robot_sigma(sigma)).ok_or(CalibrationError::NoPose)
         };
-        // The errors are right if the squared error equals the number of remaining equations; it decreases with growing
-        // errors.
+        // The assumed robot errors are correct if the squared error equals the number of remaining equations. The
+        // squared error decreases as the assumed errors grow.
         let weighed = |first: f64, from: &Bundle<'a>| {
             let mut scale = first;
             let mut minimum = solve(scale, from)?;
@@ -123,7 +123,7 @@ impl<'a> Solved<'a> {
             Ok((minimum, scale, is_right))
         };
         let (minimum, scale, is_right) = weighed(1.0, &exact.at)?;
-        // If one pose has a large error, the minimisation with exact poses, or with small errors, may not converge.
+        // If one pose has a large error, the minimisation with exact poses or with small robot errors may not converge.
         if !is_right && closed.left_rad < MAX_RETRY_RAD {
             for first in FURTHER_SCALES {
                 if let Ok((minimum, scale, true)) = weighed(first, &start) {
@@ -134,13 +134,13 @@ impl<'a> Solved<'a> {
         Ok(solved(minimum, Some(scale)))
     }
 
-    /// Multiples of [`ROBOT_SIGMA`], 0 if robot poses count as exact.
+    /// Robot errors as a multiple of [`ROBOT_SIGMA`]; 0 if robot poses count as exact.
     pub(super) fn robot_noise(&self) -> f64 {
         self.robot_scale.unwrap_or_default()
     }
 
-    /// The decrease of the squared error with a free scale of the board and the present weights of the robot's errors,
-    /// relative to the decrease expected by chance: 1.
+    /// The decrease of the squared error when the board's scale becomes free while the weights of the robot's errors
+    /// are kept. By chance alone, 1 is expected.
     pub(super) fn gain_of_free_scale(&self) -> f64 {
         let at = &self.minimum.at;
         let free = minimise(at.with_free_scale(at.board_scale));
@@ -153,16 +153,17 @@ impl<'a> Solved<'a> {
         Some([self.minimum.at.board_scale, variance.max(0.0).sqrt()])
     }
 
-    /// Squares are in pixels, with the weighted robot's errors.
+    /// The variance, in squared pixels, with the weighted errors of the robot included.
     pub(super) fn variance(&self) -> f64 {
         self.corner_sigma_px * self.corner_sigma_px
     }
 
-    /// `X` without each picture.
+    /// The solution `X` without each picture.
     pub(super) fn without_each(&self) -> Vec<Isometry3<f64>> {
         let all = &self.minimum.at;
         (0..all.num_views())
-            // If no solution exists without a picture, everything depends on it: the value is the sum of all others.
+            // If no solution exists without a picture, the result depends on it: the change is then as large as the
+            // pose itself.
             .map(|k| minimise(all.without(k)).map_or(Isometry3::identity(), |minimum| minimum.at.x))
             .collect()
     }

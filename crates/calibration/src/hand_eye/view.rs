@@ -5,10 +5,11 @@ use sdg_geometry::Mount;
 
 use crate::detection::SeenCorner;
 
-/// With three pictures, none can be removed.
+/// Minimum number of pictures. With three, none could be left out.
 pub const MIN_POSES: usize = 4;
 
-/// `A_i`. With the camera on the hand the board is at rest; beside the robot the flange holds it.
+/// The motion `A_i`. With the camera on the hand, the board is at rest; with the camera beside the robot, the flange
+/// holds the board.
 pub(super) fn motion(mount: Mount, base_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
     match mount {
         Mount::Hand => base_from_flange.inverse(),
@@ -16,7 +17,7 @@ pub(super) fn motion(mount: Mount, base_from_flange: &Isometry3<f64>) -> Isometr
     }
 }
 
-/// A robot's pose and the corners seen from it.
+/// A robot's pose and the corners in the picture taken there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandEyeView {
     /// The pose of the flange according to the robot, in metres.

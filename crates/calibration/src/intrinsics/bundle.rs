@@ -1,4 +1,4 @@
-//! Reprojection over all pictures: a camera that they share, and a pose of the board in each.
+//! Reprojection over all pictures: the common camera, and a pose of the board in each picture.
 
 use nalgebra::{Isometry3, SVector, Vector3, Vector6};
 use sdg_geometry::PinholeCamera;
@@ -16,7 +16,7 @@ pub(super) struct Bundle<'a> {
     pub(super) camera: PinholeCamera,
     /// `camera_from_board` of each picture.
     pub(super) poses: Vec<Isometry3<f64>>,
-    /// Huber's bound: larger residuals count by their length, not by its square.
+    /// Huber's bound, in pixels: larger residuals count by their length instead of its square.
     pub(super) robust_px: f64,
     pub(super) has_k3: bool,
 }
@@ -33,7 +33,7 @@ impl Problem<NUM_INTRINSICS> for Bundle<'_> {
                 let weight = if length <= self.robust_px { 1.0 } else { self.robust_px / length };
                 block.add(&residual, &projected.by_intrinsics, &(projected.by_point * by_twist(&p)), weight);
                 if weight < 1.0 {
-                    // Huber's 2 b |r| - b², not the weighted square b |r|.
+                    // Huber's cost 2 b |r| - b², instead of the weighted square b |r|.
                     block.cost += self.robust_px * (length - self.robust_px);
                 }
             }
@@ -59,7 +59,7 @@ impl Bundle<'_> {
         self.views.iter().map(Vec::len).sum()
     }
 
-    /// Squared distances of a picture's corners, in pixels.
+    /// Squared distances of a picture's corners from their projections, in square pixels.
     fn squares(&self, view: usize) -> impl Iterator<Item = f64> {
         self.views[view].iter().map(move |seen| {
             let p = self.poses[view] * self.board.corner(seen.corner);
@@ -78,7 +78,7 @@ impl Bundle<'_> {
         (sum / self.num_corners() as f64).sqrt()
     }
 
-    /// Without corners farther away than `ratio` times the RMS, unless a picture has few.
+    /// Excludes corners farther away than `ratio` times the RMS, except from pictures with few corners.
     pub(super) fn without_outliers(mut self, ratio: f64) -> Self {
         let bound = (ratio * self.rms_px()).powi(2);
         let kept = (0..self.views.len()).map(|view| {
@@ -94,12 +94,12 @@ impl Bundle<'_> {
         self
     }
 
-    /// The board's normal, towards the camera, in the optical frame, of each picture.
+    /// The board's normal, towards the camera, in the optical frame, for each picture.
     pub(super) fn normals(&self) -> Vec<Vector3<f64>> {
         self.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect()
     }
 
-    /// The largest angle between two pictures' normals.
+    /// The largest angle between the normals of two pictures, in degrees.
     pub(super) fn tilt_range_deg(&self) -> f64 {
         let normals = self.normals();
         let angles = normals.iter().flat_map(|a| normals.iter().map(move |b| a.angle(b)));

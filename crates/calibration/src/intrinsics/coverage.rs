@@ -1,4 +1,4 @@
-//! Missing views of a calibration, and the most useful next one.
+//! Finds missing views of a calibration, the most useful first.
 
 use std::fmt;
 
@@ -13,22 +13,22 @@ use super::bundle::Bundle;
 pub enum Advice {
     /// The board faces the camera in all pictures.
     FaceOn {
-        /// The largest tilt so far, degrees.
+        /// The largest tilt so far, in degrees.
         max_tilt_deg: f64,
     },
     /// The board is tilted, but about one axis only.
     OneAxis {
-        /// The direction in which it was not tilted.
+        /// The directions in which the board was not tilted.
         missing: &'static str,
     },
     /// The board is small in all pictures.
     TooFar {
-        /// Largest share of the picture that it fills.
+        /// Largest fraction of the picture that the board fills.
         max_share: f64,
     },
-    /// The lens is not determined there.
+    /// A part of the picture without corners, in which the lens is not determined.
     Empty {
-        /// The part of the picture.
+        /// The part of the picture, as part of a sentence.
         part: &'static str,
     },
     /// There are few pictures.
@@ -46,40 +46,41 @@ impl fmt::Display for Advice {
                 "all pictures show the board nearly face-on (at most {max_tilt_deg:.0} degrees): tilt it by 20 to 40 degrees"
             ),
             Self::OneAxis { missing } => {
-                write!(f, "no picture shows the board tilted {missing}: tilt it so by 20 to 40 degrees")
+                write!(f, "no picture shows the board tilted {missing}: tilt it that way by 20 to 40 degrees")
             }
             Self::TooFar { max_share } => {
                 write!(
                     f,
-                    "the board fills at most {:.0} % of the picture: go nearer, to 30 % or more",
+                    "the board fills at most {:.0} % of the picture: move it nearer, to 30 % or more",
                     100.0 * max_share
                 )
             }
             Self::Empty { part } => write!(f, "no picture shows the board {part} of the picture: hold it there"),
-            Self::Few { found } => write!(f, "{found} pictures are few: 10 to 20 average more noise out"),
+            Self::Few { found } => write!(f, "{found} pictures are few: 10 to 20 reduce the noise further"),
         }
     }
 }
 
-/// Minimum tilt of a board that is not face-on.
+/// Minimum tilt of a board that is not face-on, in degrees.
 const MIN_TILT_DEG: f64 = 15.0;
-/// Minimum range, largest minus smallest, of tilts about an axis.
+/// Minimum range of tilts about an axis, in degrees.
 const MIN_SPREAD_DEG: f64 = 15.0;
-/// Minimum share of the picture filled by the largest board.
+/// Minimum fraction of the picture that the largest board fills.
 const MIN_SHARE: f64 = 0.12;
 const MIN_PICTURES: usize = 8;
-/// The picture's parts, three by three.
+/// The parts of the picture, three by three.
 const PARTS: [[&str; 3]; 3] = [
     ["in the upper left corner", "at the upper border", "in the upper right corner"],
     ["at the left border", "in the middle", "at the right border"],
     ["in the lower left corner", "at the lower border", "in the lower right corner"],
 ];
 
-/// The deficiencies, most useful first: without tilts the focal length is undetermined, without corners the lens.
+/// The deficiencies, the most useful to correct first: without tilts the focal length is undetermined, without corners
+/// in all parts the lens.
 pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
     let mut advice = Vec::new();
     let normals = bundle.normals();
-    // Towards the camera is -z.
+    // The direction towards the camera is -z.
     let max_tilt = normals.iter().map(|normal| (-normal.z).clamp(-1.0, 1.0).acos()).fold(0.0, f64::max).to_degrees();
     let spread = |component: usize| {
         let angles = || normals.iter().map(|normal| normal[component].atan2(-normal.z).to_degrees());
@@ -107,7 +108,7 @@ pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
             [seen.pixel.x / width, seen.pixel.y / height].map(|share| (3.0 * share).clamp(0.0, 2.0) as usize);
         is_seen[row][column] = true;
     }
-    // Corners first, because the lens's distortion is largest there.
+    // The picture's corners come first, because the lens's distortion is largest in them.
     for [row, column] in [[0, 0], [0, 2], [2, 0], [2, 2], [0, 1], [1, 0], [1, 2], [2, 1], [1, 1]] {
         if !is_seen[row][column] {
             advice.push(Advice::Empty { part: PARTS[row][column] });

@@ -1,14 +1,14 @@
-//! From pictures of the board to a camera's focal length, centre and lens.
+//! Estimates a camera's focal length, centre and lens from pictures of the board.
 //!
 //! ```text
-//! corners ─ homographies ─ focal length in closed form ─ poses ─ Levenberg–Marquardt over everything
-//!         ─ pictures that disagree with the others left out, one by one ─ errors, coverage
+//! corners ─ homographies ─ focal length in closed form ─ poses ─ Levenberg–Marquardt over all parameters
+//!         ─ pictures that contradict the others left out one by one ─ errors, coverage
 //! ```
-//! The lens has k1, k2, p1, p2, and k3 if requested: with fewer than about twenty pictures k3 follows the noise.
+//! The lens has k1, k2, p1, p2, and k3 if requested: with fewer than about twenty pictures, noise determines k3.
 //!
 //! # Source
-//! Zhang, A flexible new technique for camera calibration, 2000; closed form with the principal point at the centre of
-//! the picture.
+//! Zhang, A flexible new technique for camera calibration, 2000. The closed form has the principal point at the centre
+//! of the picture.
 
 mod bundle;
 mod coverage;
@@ -26,14 +26,14 @@ use crate::least_squares::{Minimum, minimise};
 use crate::pose::{from_homography, places};
 use crate::projection::NUM_INTRINSICS;
 
-/// The estimated parameters, and the picture size.
+/// The size of the pictures, and the parameters to estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibrationConfig {
-    /// Size of the pictures.
+    /// Width of the pictures, in pixels.
     pub width: u32,
-    /// Size of the pictures.
+    /// Height of the pictures, in pixels.
     pub height: u32,
-    /// Whether the lens has a k3.
+    /// Whether k3 of the lens is estimated.
     pub has_k3: bool,
 }
 
@@ -43,11 +43,11 @@ pub struct Calibration {
     /// Focal length, centre and lens.
     pub camera: PinholeCamera,
     /// Standard errors of fx, fy, cx, cy (pixels), k1, k2, p1, p2, k3, from the normal matrix and the residuals. They
-    /// cover noise in the corners, but not a board that is not flat.
+    /// include noise of the corners, but not a board that is not flat.
     pub sigma: [f64; NUM_INTRINSICS],
-    /// Root of the mean squared distance between corners and their projections, over the used pictures.
+    /// Root of the mean squared distance between corners and their projections, in pixels, over the used pictures.
     pub rms_px: f64,
-    /// One for each picture, in the given order.
+    /// The result for each picture, in the given order.
     pub pictures: Vec<PictureFit>,
     /// Deficiencies of the pictures, most useful first.
     pub advice: Vec<Advice>,
@@ -57,7 +57,7 @@ impl Calibration {
     /// Names of the intrinsics, in the order of [`Self::sigma`].
     pub const NAMES: [&str; NUM_INTRINSICS] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 
-    /// The intrinsics in that order, pixels with the first centre at (0, 0), as in a camera's file.
+    /// The intrinsics in the order of [`Self::NAMES`]; pixels with the first centre at (0, 0), as in a camera file.
     pub fn values(&self) -> [f64; NUM_INTRINSICS] {
         let camera = self.camera;
         let [k1, k2, p1, p2, k3] = camera.lens.to_array();
@@ -65,37 +65,37 @@ impl Calibration {
     }
 }
 
-/// The contribution of one picture.
+/// The result for one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureFit {
-    /// Its corners' RMS; for an excluded picture, with the camera found without it.
+    /// RMS error of the corners; for an excluded picture, with the camera estimated without it.
     pub rms_px: f64,
     /// Pose of the board in the camera's frame.
     pub camera_from_board: Isometry3<f64>,
-    /// Whether it was excluded because it disagrees with the others.
+    /// Whether the picture was excluded because it disagrees with the others.
     pub is_left_out: bool,
 }
 
-/// Three pictures give six equations for the closed form, which leaves redundancy.
+/// Minimum number of pictures: three give the closed form six equations, more than it needs.
 pub const MIN_PICTURES: usize = 3;
-/// Residual from which the weight decreases, in pixels, while pictures are judged: a few times the corners' error.
+/// Residual, in pixels, above which the weight decreases while pictures are compared: a few times the error of corners.
 const ROBUST_PX: f64 = 1.0;
-/// A picture is excluded if its RMS is this many times the median and at least this many pixels.
+/// A picture is excluded if its RMS is at least this many times the median and at least [`MAX_RMS_PX`].
 const MAX_RMS_RATIO: f64 = 3.0;
 const MAX_RMS_PX: f64 = 0.5;
-/// Corners at this many times the RMS, and at least this many pixels, are excluded at the end.
+/// Corners at this many times the RMS, and at least the given number of pixels, are excluded at the end.
 const MAX_CORNER_RATIO: f64 = 6.0;
-/// Largest relative error of the focal length of a valid calibration.
+/// Largest relative standard error of the focal length in a valid calibration.
 const MAX_FOCAL_SIGMA: f64 = 0.03;
-/// Minimum error of corners: residuals of few corners may be smaller by chance.
+/// Assumed minimum error of corners, in pixels: the residuals of few corners may be smaller by chance.
 const MIN_CORNER_SIGMA_PX: f64 = 0.02;
-/// Boards whose normals differ by less are equivalent for the closed form, degrees.
+/// Minimum angle between the board's normals for the closed form, in degrees.
 const MIN_TILT_RANGE_DEG: f64 = 6.0;
 
-/// Finds the camera that explains the boards in the pictures.
+/// Estimates the camera from the corners in all pictures.
 ///
 /// # Units and frames
-/// Pixels with the first centre at (0.5, 0.5).
+/// Pixels, the first centre at (0.5, 0.5).
 ///
 /// # Errors
 /// [`CalibrationError::TooFewPictures`], [`CalibrationError::PosesAlike`], [`CalibrationError::NoPose`].
@@ -109,7 +109,7 @@ pub fn calibrate(
     }
     let all: Vec<usize> = (0..pictures.len()).collect();
     let (mut used, mut minimum) = (all.clone(), first_fit(board, pictures, &all, config)?);
-    // One by one, because a bad picture makes others look bad.
+    // One by one, because a bad picture increases the errors of others.
     while let Some(worst) = disagreeing(&minimum.at.rms_of_pictures()) {
         used.remove(worst);
         if used.len() < MIN_PICTURES {
@@ -131,7 +131,7 @@ fn too_few(found: usize, hint: &'static str) -> CalibrationError {
     CalibrationError::TooFewPictures { least: MIN_PICTURES, found, hint }
 }
 
-/// The better result of two initial focal lengths: that of the closed form, and the picture's longer side.
+/// The better of two results: starting at the closed form's focal length, and at the picture's longer side.
 fn first_fit<'a>(
     board: &Board,
     pictures: &'a [Vec<SeenCorner>],
@@ -162,8 +162,8 @@ fn first_fit<'a>(
     minima.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or(CalibrationError::NoPose)
 }
 
-/// The focal length of square pixels with the given centre, by least squares over all homographies; `None` if it would
-/// be imaginary.
+/// The focal length of square pixels with the given centre, by least squares over all homographies; `None` if its
+/// square would be negative.
 ///
 /// With `h` the columns of a homography, `ω = diag(1/f², 1/f², 1)`: `h1ᵀ ω h2 = 0` and `h1ᵀ ω h1 = h2ᵀ ω h2`.
 pub(crate) fn focal_length(homographies: &[Matrix3<f64>], cx: f64, cy: f64) -> Option<f64> {
@@ -173,7 +173,7 @@ pub(crate) fn focal_length(homographies: &[Matrix3<f64>], cx: f64, cy: f64) -> O
             let h = homography.column(k);
             Vector3::new(h[0] - cx * h[2], h[1] - cy * h[2], h[2])
         });
-        // Near and far, small and large boards have equal weight.
+        // The scale gives small and large boards equal weight.
         let scale = 1.0 / (a.norm() * b.norm());
         let planar = |a: &Vector3<f64>, b: &Vector3<f64>| a.x * b.x + a.y * b.y;
         let equations =
@@ -187,7 +187,7 @@ pub(crate) fn focal_length(homographies: &[Matrix3<f64>], cx: f64, cy: f64) -> O
     (squared.is_finite() && squared > 0.0).then(|| squared.sqrt())
 }
 
-/// The picture that disagrees most with the others, if any.
+/// The index of the picture that disagrees most with the others, if any.
 fn disagreeing(rms: &[f64]) -> Option<usize> {
     let median = upper_median(rms.iter().copied())?;
     let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]))?;
@@ -228,7 +228,7 @@ fn alike(bundle: &Bundle<'_>, hint: String) -> CalibrationError {
     CalibrationError::PosesAlike { found: format!("tilts that differ by {range:.0} degrees at most"), hint }
 }
 
-/// Every picture with the camera: the used and the excluded ones.
+/// The result for every picture with the camera, including the excluded ones.
 fn fits(
     board: &Board,
     pictures: &[Vec<SeenCorner>],

@@ -1,8 +1,8 @@
-//! The focal length of an uncalibrated camera, from one picture of the sheet, and the effect of its uncertainty.
+//! The focal length of an uncalibrated camera from one picture of the sheet, and the effect of its error.
 //!
-//! Square pixels, no lens distortion, and an optical axis near the middle of the picture are assumed. A sheet seen
-//! vertically from above has the same picture at every focal length (twice as long, twice as far); the accuracy of the
-//! focal length grows with the tilt.
+//! Assumptions: square pixels, no lens distortion, and an optical axis near the centre of the picture. A sheet seen
+//! vertically from above has the same picture at every focal length (twice as long, twice as far away), so the accuracy
+//! of the focal length increases with the tilt.
 
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
@@ -17,30 +17,30 @@ use crate::least_squares::{Block, Problem, minimise};
 use crate::pose::{board_pose, places};
 use crate::projection::{by_twist, motion, off, project};
 
-/// A focal length and its error.
+/// A focal length and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocalEstimate {
-    /// Pixels, the same for both axes.
+    /// The focal length in pixels, the same for both axes.
     pub focal_px: f64,
-    /// Its standard error, from the corners' residuals and an optical axis slightly away from the centre.
+    /// Standard error in pixels, from the corners' residuals and an optical axis slightly away from the centre.
     pub sigma_px: f64,
 }
 
 impl FocalEstimate {
-    /// Standard error as a share of the focal length.
+    /// The standard error relative to the focal length.
     pub fn relative_sigma(&self) -> f64 {
         self.sigma_px / self.focal_px
     }
 }
 
-/// Distance of the optical axis from the picture's centre, as a share of its longer side: typical of phones and
+/// Standard deviation of the optical axis from the picture's centre, relative to the longer side: typical of phones and
 /// webcams.
 const CENTER_SIGMA: f64 = 0.02;
-/// Minimum error of corners.
+/// Assumed minimum error of corners, in pixels.
 const MIN_CORNER_SIGMA_PX: f64 = 0.05;
-/// Range of focal lengths of cameras, in longer sides of the picture.
+/// Range of focal lengths of cameras, in multiples of the picture's longer side.
 const FOCALS: [f64; 2] = [0.3, 10.0];
-/// Further starts of the search besides the closed form, as shares of the longer side.
+/// Initial values of the search besides the closed form, in multiples of the longer side.
 const STARTS: [f64; 2] = [0.8, 1.5];
 
 /// A camera with its axis at the centre.
@@ -49,7 +49,8 @@ fn centered((width, height): (u32, u32), focal_px: f64) -> PinholeCamera {
     PinholeCamera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
 }
 
-/// The focal length from the sheet's perspective; `None` if it is undetermined: seen vertically from above.
+/// The focal length from the sheet's perspective; `None` if it is undetermined, as for a sheet seen vertically from
+/// above.
 pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner]) -> Option<FocalEstimate> {
     let longer = f64::from(size.0.max(size.1));
     let middle = centered(size, longer);
@@ -57,7 +58,7 @@ pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner])
     let closed = focal_length(&[homography], middle.cx, middle.cy);
     let starts = closed.into_iter().chain(STARTS.map(|share| share * longer));
     let plausible = FOCALS[0] * longer..FOCALS[1] * longer;
-    // The homography has eight parameters and explains everything except the corners' noise, in x and in y.
+    // The homography has eight parameters and explains everything except the noise of the corners, in x and in y.
     let freedom = (2 * corners.len()).checked_sub(8).filter(|freedom| *freedom > 0)? as f64;
     let noise = homography_rms_px(board, corners)? * (corners.len() as f64 / freedom).sqrt();
     let corner_sigma = noise.max(MIN_CORNER_SIGMA_PX);
@@ -73,7 +74,8 @@ pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner])
     (plausible.contains(&estimate.focal_px) && estimate.sigma_px.is_finite()).then_some(estimate)
 }
 
-/// Root mean square distance of corners from the homography: the part that it cannot explain is the lens's distortion.
+/// Root mean square distance of corners from the homography, in pixels: the lens's distortion, which a homography
+/// cannot explain, and noise.
 pub fn homography_rms_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     let places = places(board, corners);
     let homography = homography::fit(&places)?;
@@ -82,24 +84,24 @@ pub fn homography_rms_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
     Some((sum / places.len() as f64).sqrt())
 }
 
-/// Movement of positions if the focal length is wrong, in metres.
+/// The errors of positions, in metres, for a given error of the focal length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocalCost {
-    /// Its assumed relative error.
+    /// The assumed relative error of the focal length.
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// At the sheet's centre, m.
+    /// Error at the sheet's centre, in metres.
     pub at_sheet_m: f64,
-    /// At the worst point along the picture's border, as far as it shows that plane.
+    /// Largest error along the picture's border, in metres, where it shows the plane at that height.
     pub at_border_m: f64,
 }
 
-/// Compares positions at a height with those for a longer and a shorter focal length, with the pose computed again for
-/// each.
+/// Compares positions at a height for the given focal length with those for a longer and a shorter one. The pose is
+/// estimated again for each focal length.
 ///
 /// # Errors
-/// As [`locate_sheet`].
+/// The errors of [`locate_sheet`].
 pub fn focal_cost(
     camera: &PinholeCamera,
     board: &Board,
@@ -132,14 +134,14 @@ pub fn focal_cost(
     })
 }
 
-/// Parameters: focal length, both coordinates of the centre, and the pose's twist.
+/// The parameters: focal length, both coordinates of the centre, and the pose's twist.
 #[derive(Clone)]
 struct Sheet<'a> {
     board: Board,
     corners: &'a [SeenCorner],
     camera: PinholeCamera,
     camera_from_board: Isometry3<f64>,
-    /// The weight of the squared distance of the principal point from the picture's centre.
+    /// Weight of the squared distance of the principal point from the picture's centre.
     prior: f64,
 }
 
@@ -150,7 +152,7 @@ impl Problem<9> for Sheet<'_> {
             let p = self.camera_from_board * self.board.corner(seen.corner);
             let projected = project(&self.camera, &p)?;
             let mut by_all = SMatrix::<f64, 2, 9>::zeros();
-            // One focal length for both axes.
+            // The focal length is the same for both axes.
             by_all.set_column(0, &(projected.by_intrinsics.column(0) + projected.by_intrinsics.column(1)));
             by_all.set_column(1, &projected.by_intrinsics.column(2));
             by_all.set_column(2, &projected.by_intrinsics.column(3));

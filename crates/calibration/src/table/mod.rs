@@ -1,11 +1,11 @@
-//! One picture of the sheet on the table: the camera's pose.
+//! The camera's pose from one picture of the sheet on the table.
 //!
 //! ```text
-//! corners ─┬─ with intrinsics: the pose that minimises reprojection, its errors        sheet_pose.rs
-//!          └─ without: homography, focal length if the tilt determines it, else a guess  focal.rs
+//! corners ─┬─ intrinsics known: the pose with the smallest reprojection error, and its uncertainty   sheet_pose.rs
+//!          └─ unknown: homography; the focal length if the tilt determines it, else a guess          focal.rs
 //! ```
-//! A homography alone gives positions on the table. For positions above the table the focal length matters;
-//! [`FocalCost`] has the size of that effect.
+//! A homography alone gives positions on the table. Positions above the table depend on the focal length; [`FocalCost`]
+//! states how much.
 
 mod focal;
 mod sheet_pose;

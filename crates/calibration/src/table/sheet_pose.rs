@@ -1,4 +1,4 @@
-//! The camera's pose over the sheet, and its errors.
+//! The camera's pose above the sheet, and its errors.
 
 use nalgebra::{Isometry3, Vector3};
 use sdg_geometry::PinholeCamera;
@@ -8,26 +8,28 @@ use crate::detection::SeenCorner;
 use crate::error::CalibrationError;
 use crate::pose::board_pose;
 
-/// The pose of a camera over a sheet.
+/// The pose of a camera above a sheet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetPose {
-    /// From the optical frame to the sheet's frame (origin and axes as in [`Board`], z up from the sheet), in metres.
+    /// Transform from the optical frame to the sheet's frame (origin and axes as in [`Board`], z up from the sheet), in
+    /// metres.
     pub sheet_from_camera: Isometry3<f64>,
-    /// Root of the mean squared distance between corners and their projections.
+    /// Root of the mean squared distance between corners and their projections, in pixels.
     pub rms_px: f64,
-    /// Standard error of the camera's height over the sheet, metres, from the corners alone: the intrinsics count as exact.
+    /// Standard error of the camera's height above the sheet, in metres, from the corners alone: the intrinsics count
+    /// as exact.
     pub sigma_height_m: f64,
-    /// Standard error of the tilt about a horizontal axis, radians.
+    /// Standard error of the tilt about a horizontal axis, in radians.
     pub sigma_tilt_rad: f64,
-    /// The angle between the optical axis and the vertical, radians.
+    /// The angle between the optical axis and the vertical, in radians.
     pub tilt_rad: f64,
 }
 
-/// Largest angle from the vertical: beyond it the horizon is close, and a millimetre of the table is at best a fifth of
-/// a pixel.
+/// Largest angle from the vertical, in degrees. Beyond it, the horizon is near, and a millimetre of the table is at
+/// most a fifth of a pixel.
 const MAX_TILT_DEG: f64 = 75.0;
 
-/// Finds the camera over the sheet.
+/// Finds the camera's pose above the sheet.
 ///
 /// # Errors
 /// [`CalibrationError::NoPose`], [`CalibrationError::Horizon`].
@@ -44,7 +46,7 @@ pub fn locate_sheet(
     if tilt_rad.to_degrees() > MAX_TILT_DEG {
         return Err(CalibrationError::Horizon { tilt_deg: tilt_rad.to_degrees(), max_deg: MAX_TILT_DEG });
     }
-    // After a twist (v, ω) the camera's position in the sheet's frame moves by -Rᵀ v.
+    // A twist (v, ω) moves the camera's position in the sheet's frame by -Rᵀ v.
     let of_place = pose.covariance.fixed_view::<3, 3>(0, 0);
     let sigma_height_m = (normal.transpose() * of_place * normal)[0].max(0.0).sqrt();
     let of_turn = pose.covariance.fixed_view::<3, 3>(3, 3);

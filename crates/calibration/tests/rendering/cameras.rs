@@ -1,4 +1,4 @@
-//! Cameras and their board poses, for the comparison with OpenCV.
+//! Cameras and the poses of their boards, for the comparison with OpenCV.
 
 use image::GrayImage;
 use nalgebra::Isometry3;
@@ -18,7 +18,7 @@ pub const WEBCAM: PinholeCamera = PinholeCamera {
     lens: PlumbBob { k1: 0.08, k2: -0.17, p1: -0.001, p2: 0.0006, k3: 0.0 },
 };
 
-/// A wide lens of few pixels, a webcam, and a long lens of many pixels.
+/// A wide-angle lens with few pixels, a webcam, and a telephoto lens with many pixels.
 pub const CAMERAS: [(&str, PinholeCamera); 3] = [
     (
         "wide",
@@ -47,7 +47,7 @@ pub const CAMERAS: [(&str, PinholeCamera); 3] = [
     ),
 ];
 
-/// Pictures of each camera.
+/// Number of pictures of each camera.
 pub const NUM_PICTURES: usize = 15;
 
 /// The board of the comparison.
@@ -55,7 +55,8 @@ pub fn board() -> Board {
     Board::new(9, 6, 0.025).expect("a board")
 }
 
-/// The board's pose in each picture: all over it, tilted in every direction by up to 40 degrees, completely visible.
+/// The board's pose in each picture: at positions all over the picture, tilted in every direction by up to 40 degrees,
+/// completely visible.
 pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
     let board = board();
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
@@ -70,7 +71,7 @@ pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
             ];
             let tilts = [random.within(-0.36, 0.36), random.within(-0.36, 0.36), random.within(-0.3, 0.3)];
             let pose = camera_from_board(&board, camera, pixel, distance, tilts);
-            // One square around it is white.
+            // The white margin around the board is one square wide.
             let rim = [[0, 0], [0, board.rows()], [board.columns(), 0], [board.columns(), board.rows()]];
             let is_whole = rim.iter().all(|corner| {
                 camera.project(&(pose * board.corner(*corner))).is_some_and(|pixel| {

@@ -1,7 +1,7 @@
-//! Pictures of boards with the truth, bit-identical on every machine: only operations that IEEE 754 rounds exactly.
+//! Pictures of boards with ground truth, bit-identical on every machine: only operations that IEEE 754 rounds exactly.
 //!
-//! Every pixel is the mean over its area. The lens is inverted at the pixels' corners and approximated as linear within
-//! a pixel.
+//! Every pixel is the mean over its area. The lens is inverted at the corners of the pixels and approximated as linear
+//! within a pixel.
 #![allow(dead_code)]
 
 pub mod cameras;
@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaterni
 use sdg_calibration::Board;
 use sdg_geometry::PinholeCamera;
 
-/// SplitMix64: a generator that does not change with a crate's version.
+/// SplitMix64: a generator that does not change with the version of a crate.
 #[derive(Debug, Clone)]
 pub struct Random(pub u64);
 
@@ -30,7 +30,7 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// Nearly normal with deviation 1: the sum of twelve uniform numbers needs no logarithm.
+    /// Nearly normal with standard deviation 1: the sum of twelve uniform numbers, which needs no logarithm.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
@@ -46,7 +46,7 @@ pub struct Exposure {
     pub falloff: f64,
     /// Number of applications of the binomial 3 × 3 kernel: each adds a variance of 0.5 px².
     pub blur: u32,
-    /// Deviation of the noise.
+    /// Standard deviation of the noise.
     pub noise: f64,
 }
 
@@ -54,14 +54,16 @@ impl Exposure {
     pub const ORDINARY: Self = Self { ink: 35.0, paper: 215.0, falloff: 0.25, blur: 1, noise: 2.0 };
 }
 
-/// A turn about `axis` whose half angle has this tangent: no sine, which other machines round differently.
+/// A rotation about `axis`, given by the tangent of half the angle: it needs no sine, whose rounding depends on the
+/// machine.
 pub fn turn(axis: [f64; 3], half_tangent: f64) -> UnitQuaternion<f64> {
     let [x, y, z] = axis.map(|value| value * half_tangent);
     UnitQuaternion::from_quaternion(Quaternion::new(1.0, x, y, z))
 }
 
-/// The board's pose: its centre at `pixel` (of the pinhole without lens) and `distance_m` along the axis, turned in the
-/// picture by `roll`, then tilted about the picture's x and y; all turns as tangents of half angles.
+/// The board's pose: its centre is at `pixel` (of the pinhole without lens), at `distance_m` along the axis; it is
+/// rotated in the picture by `roll`, then tilted about the picture's x and y. All angles are given as tangents of half
+/// angles.
 pub fn camera_from_board(
     board: &Board,
     camera: &PinholeCamera,
@@ -90,7 +92,7 @@ pub fn render(
     render_with(&|place| board.is_inked(place), board, camera, camera_from_board, exposure, random)
 }
 
-/// As [`render`], with another print: `is_inked` takes points in sides of a square.
+/// Like [`render`], with another print: `is_inked` takes points in sides of a square.
 pub fn render_with(
     is_inked: &dyn Fn(&Point2<f64>) -> bool,
     board: &Board,
@@ -119,7 +121,7 @@ pub fn render_with(
             (false, false) => 0.5 * (exposure.ink + exposure.paper),
         }
     };
-    // Four pixels share a corner.
+    // Four pixels have a common corner.
     let places: Vec<Option<(Point2<f64>, f64)>> =
         places.into_iter().map(|place| place.map(|place| (place, brightness(&place)))).collect();
     let mut values = vec![0.5 * (exposure.ink + exposure.paper); width * height];
@@ -140,7 +142,7 @@ pub fn render_with(
     })
 }
 
-/// The mean over a pixel with these corners and their brightness; 16 × 16 samples if it is not uniform.
+/// The mean over a pixel, from its corners and their brightness; from 16 × 16 samples if these differ.
 fn mean_over(corners: [(Point2<f64>, f64); 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
     const SIDE: usize = 16;
     let [a, b, c, d] = corners.map(|(place, _)| place);

@@ -1,4 +1,4 @@
-//! The body of a response, without its framing.
+//! The body of a response, with its framing removed.
 
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
@@ -11,7 +11,7 @@ const MAX_CHUNK_LINE_BYTES: usize = 1024;
 /// Bytes per read.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// The end of a body.
+/// The framing, which determines where a body ends.
 #[derive(Debug)]
 pub(super) enum Framing {
     /// After this number of bytes.
@@ -25,7 +25,7 @@ pub(super) enum Framing {
 /// Position within the chunks.
 #[derive(Debug)]
 pub(super) enum Chunk {
-    /// In the size line; the part received so far.
+    /// In the size line; contains the part received so far.
     Size(Vec<u8>),
     /// In the data.
     Data { left: u64 },
@@ -89,7 +89,7 @@ impl Chunk {
                 match first {
                     b'\r' => {}
                     b'\n' => *self = Self::Size(Vec::new()),
-                    _ => return Err("expected a line end behind a chunk, found something else".to_owned()),
+                    _ => return Err("expected a line end after a chunk, found other bytes".to_owned()),
                 }
             }
             Self::End => {}
@@ -120,22 +120,23 @@ pub(super) enum Progress {
 pub(super) struct Body {
     stream: TcpStream,
     framing: Framing,
-    /// Bytes of the body received with the head, without framing, until they are returned.
+    /// Bytes of the body that were received with the head, without framing, until they are returned.
     first: Vec<u8>,
 }
 
 impl Body {
-    /// A body whose first bytes came with the head.
+    /// Creates a body whose first bytes were received with the head.
     pub(super) fn new(stream: TcpStream, bytes: Vec<u8>, mut framing: Framing) -> Result<Self, String> {
         let mut first = Vec::new();
         framing.unframe(&bytes, &mut first)?;
         Ok(Self { stream, framing, first })
     }
 
-    /// Waits for bytes until the deadline and appends them to `out`. Without a deadline it takes the available bytes.
+    /// Waits for bytes until the deadline and appends them to `out`. Without a deadline, only available bytes are
+    /// appended.
     ///
     /// # Errors
-    /// Text that describes the error of the connection or of its framing.
+    /// Text that describes the error of the connection or the framing.
     pub(super) fn read(&mut self, out: &mut Vec<u8>, deadline: Option<Instant>) -> Result<Progress, String> {
         if !self.first.is_empty() {
             out.append(&mut self.first);
@@ -153,7 +154,7 @@ impl Body {
         let mut piece = [0; PIECE_BYTES];
         match self.stream.read(&mut piece) {
             Ok(0) if matches!(self.framing, Framing::UntilClose) => Ok(Progress::End),
-            Ok(0) => Err("the connection was closed in mid-answer".to_owned()),
+            Ok(0) => Err("the connection was closed within the response".to_owned()),
             Ok(count) => self.framing.unframe(&piece[..count], out).map(|()| Progress::More),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(Progress::Late),
             Err(error) if error.kind() == ErrorKind::Interrupted => Ok(Progress::More),

@@ -23,7 +23,8 @@ pub(super) struct Answer {
     pub(super) body: Body,
 }
 
-/// The client's state for the server's challenge, kept between pictures: each picture then needs only one request.
+/// The client's answer to the server's authentication challenge. It is kept between pictures, so that each picture
+/// needs only one request.
 #[derive(Default)]
 pub(super) struct Login(Option<PasswordClient>);
 
@@ -36,7 +37,7 @@ pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Ans
     for _ in 0..=MAX_REDIRECTS {
         let known = login.authorization(&url).unwrap_or_default();
         let reply = match get_once(&url, known.as_deref(), deadline)? {
-            // Also if the previous authentication has become stale.
+            // Also if the previous authentication is no longer valid.
             Reply::Challenges(challenges) => {
                 login.challenged(&url, &challenges)?;
                 get_once(&url, login.authorization(&url)?.as_deref(), deadline)?
@@ -57,12 +58,12 @@ pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Ans
 enum Reply {
     Answer(Answer),
     Redirect(String),
-    /// Status 401: the authentication challenges.
+    /// Status 401, with its authentication challenges.
     Challenges(Vec<String>),
 }
 
 impl Login {
-    /// Accepts a server's challenge, digest or basic.
+    /// Prepares the answer to a server's challenge, digest or basic.
     fn challenged(&mut self, url: &Url, challenges: &[String]) -> Result<(), String> {
         if url.credentials().is_none() {
             return Err(
@@ -75,7 +76,7 @@ impl Login {
         Ok(())
     }
 
-    /// The value of the Authorization header; `None` if no server has requested it.
+    /// The value of the Authorization header; `None` if the server has not requested it.
     fn authorization(&mut self, url: &Url) -> Result<Option<String>, String> {
         let (Some(client), Some((username, password))) = (&mut self.0, url.credentials()) else { return Ok(None) };
         let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };
@@ -123,9 +124,10 @@ fn get_once(url: &Url, authorization: Option<&str>, deadline: Instant) -> Result
 }
 
 fn connect(url: &Url, deadline: Instant) -> Result<TcpStream, String> {
-    let addresses =
-        (url.host(), url.port()).to_socket_addrs().map_err(|error| format!("{} is not known: {error}", url.host()))?;
-    let mut why = format!("{} has no number", url.host());
+    let addresses = (url.host(), url.port())
+        .to_socket_addrs()
+        .map_err(|error| format!("{} cannot be resolved: {error}", url.host()))?;
+    let mut why = format!("{} has no IP address", url.host());
     for address in addresses {
         let left = time_left(deadline).ok_or("no connection in time")?;
         match TcpStream::connect_timeout(&address, left) {

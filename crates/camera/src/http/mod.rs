@@ -1,11 +1,12 @@
-//! Cameras over HTTP/1.1: motion JPEG as `multipart/x-mixed-replace`, and single pictures that are fetched again and again.
+//! Cameras over HTTP/1.1: motion JPEG as `multipart/x-mixed-replace`, and single pictures that are requested
+//! repeatedly.
 //!
 //! ```text
 //! Url ── exchange: connect, request, head, redirects ── Body: framing ─┬─ Multipart ── MotionJpeg   (one connection)
 //!                                                                      └─ one picture ── Snapshots  (a connection each)
 //! ```
-//! A minimal HTTP client: cameras need no more, and everything that a server can send is bounded in memory and in time.
-//! Absent: TLS, compression, cookies, proxies, keep-alive between snapshots.
+//! A minimal HTTP client, sufficient for cameras; the data that a server can send is bounded in memory and in time. Not
+//! supported: TLS, compression, cookies, proxies, keep-alive between snapshots.
 
 mod body;
 mod exchange;
@@ -25,7 +26,7 @@ use crate::source::{Missing, Source};
 
 pub use url::Url;
 
-/// Sends a request and determines from the response which of the two kinds the server is.
+/// Sends a request, and determines from the response which of the two kinds of server it is.
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
     let refused = |why: String| CameraError::Open { address: url.to_string(), why };
     let mut login = exchange::Login::default();
@@ -48,11 +49,12 @@ pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Re
     }
 }
 
-/// The first pictures of a server, at most `max_pictures`, without the torn ones. Unlike a [`Camera`](crate::Camera) it does not connect
-/// again where the connection is lost, so that it ends with the server: for tests of servers, and of what servers may send.
+/// The first pictures of a server, at most `max_pictures`, without torn ones. Unlike a [`Camera`](crate::Camera), this
+/// function does not reconnect when the connection is lost, so it ends with the server. It is meant for tests of
+/// servers and of the client.
 ///
 /// # Errors
-/// [`CameraError::Open`] where the server's first answer is none of a camera.
+/// [`CameraError::Open`] if the server's first response is not a camera's.
 pub fn read_pictures(
     url: &Url,
     options: &OpenOptions,

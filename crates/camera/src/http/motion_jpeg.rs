@@ -9,8 +9,8 @@ use super::multipart::Multipart;
 use crate::decode::decode;
 use crate::source::{Missing, Source, Taken};
 
-/// Maximum time for skipping to newer pictures. Without it, a server that sends faster than the client reads would be
-/// followed for ever.
+/// Maximum time for skipping to newer pictures, so that a server that sends faster than the client reads does not cause
+/// an endless loop.
 const MAX_CATCH_UP: Duration = Duration::from_millis(20);
 
 /// One connection.
@@ -18,7 +18,7 @@ pub(super) struct MotionJpeg {
     multipart: Multipart,
     body: Body,
     frame: PixelFrame,
-    /// The end of the connection, if it was found while skipping.
+    /// The end of the connection, if it was reached while skipping.
     end: Option<Result<Progress, String>>,
 }
 
@@ -33,7 +33,7 @@ impl MotionJpeg {
     fn catch_up(&mut self, mut part: Vec<u8>) -> (Vec<u8>, u64) {
         let start = Instant::now();
         let mut num_skipped = 0;
-        // The next call finds the broken framing again and reports it.
+        // The next call finds the invalid framing again and reports it.
         loop {
             match self.multipart.next_part() {
                 Ok(Some(newer)) => {

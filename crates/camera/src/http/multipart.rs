@@ -5,14 +5,14 @@ use crate::decode::MAX_ENCODED_BYTES;
 
 /// Splits a body at its boundaries.
 ///
-/// Cameras differ, and all variants are accepted: the boundary is announced with or without its leading dashes, line
-/// ends are CRLF or LF, a part states its length or ends at the next boundary.
+/// All variants that cameras use are accepted: the boundary is announced with or without its leading dashes, lines end
+/// with CRLF or LF, and a part states its length or ends at the next boundary.
 #[derive(Debug)]
 pub(super) struct Multipart {
     /// `--` and the boundary.
     delimiter: Vec<u8>,
     buffer: Vec<u8>,
-    /// The buffer was searched for the delimiter up to this position.
+    /// Position up to which the buffer was searched for the delimiter.
     searched: usize,
     state: State,
 }
@@ -54,10 +54,10 @@ impl Multipart {
         matches!(self.state, State::Sized(_) | State::Unsized)
     }
 
-    /// The next complete part, without its head; `None` until there is more data.
+    /// The next complete part, without its head; `None` if more data is needed.
     ///
     /// # Errors
-    /// Text that describes the malformed data. Nothing after it can be read.
+    /// Text that describes the malformed data. Data after it cannot be read.
     pub(super) fn next_part(&mut self) -> Result<Option<Vec<u8>>, String> {
         loop {
             match self.state {
@@ -122,9 +122,9 @@ struct PartHead {
 }
 
 impl PartHead {
-    /// The head after a boundary, and its length with the empty line; `None` while it is incomplete.
+    /// The head after a boundary, and its length including the empty line; `None` if it is incomplete.
     fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, String> {
-        // The rest of the boundary's line: empty, or `--` after the last part.
+        // The remainder of the boundary's line: empty, or `--` after the last part.
         let Some(line_end) = bytes.iter().position(|&byte| byte == b'\n') else {
             return Ok(None);
         };

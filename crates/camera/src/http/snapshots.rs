@@ -1,4 +1,4 @@
-//! Single pictures, fetched repeatedly.
+//! Single pictures, requested repeatedly.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
@@ -16,7 +16,7 @@ use crate::source::{Missing, Source, Taken};
 pub(super) struct Snapshots {
     url: Url,
     login: Login,
-    /// The response that identified the server as one of single pictures.
+    /// The response by which the server was recognised as one of single pictures.
     first: Option<Answer>,
     interval: Duration,
     next_at: Instant,
@@ -61,7 +61,7 @@ impl Source for Snapshots {
                 }
                 Ok(Progress::More) => {}
                 Ok(Progress::End) => break,
-                // A late picture is abandoned: the next call requests a new one.
+                // The request of a late picture is abandoned; the next call sends a new one.
                 Ok(Progress::Late) => return Err(Missing::Late),
                 Err(why) => return Err(Missing::Torn(format!("{} bytes, then: {why}", bytes.len()))),
             }

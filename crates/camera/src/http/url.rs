@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use crate::error::CameraError;
 
-/// An `http://` address, with user and password if the camera requires them.
+/// An `http://` address, with user name and password if the camera requires them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Url {
-    /// Host and port as in the `Host` header: without port 80.
+    /// Host and port as in the `Host` header; port 80 is omitted.
     authority: String,
     host: String,
     port: u16,
@@ -24,7 +24,7 @@ struct Credentials {
 }
 
 impl Url {
-    /// The host's name or address; an IPv6 address without its brackets.
+    /// The host name or address; an IPv6 address without brackets.
     pub(crate) fn host(&self) -> &str {
         &self.host
     }
@@ -41,12 +41,12 @@ impl Url {
         &self.path
     }
 
-    /// User and password.
+    /// User name and password.
     pub(crate) fn credentials(&self) -> Option<(&str, &str)> {
         self.credentials.as_ref().map(|Credentials { user, password }| (user.as_str(), password.as_str()))
     }
 
-    /// The target of a redirect. User and password are sent only to the same host and port.
+    /// The target of a redirect. User name and password are sent only to the same host and port.
     ///
     /// # Errors
     /// Text that says why the target is not followed.
@@ -75,7 +75,7 @@ impl FromStr for Url {
     fn from_str(text: &str) -> Result<Self, CameraError> {
         let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
         let rest = text.strip_prefix("http://").ok_or_else(|| refused("an address that begins with http://"))?;
-        // Characters that would end the request line early are rejected.
+        // Characters that could end the request line early are rejected.
         if text.chars().any(|character| character.is_ascii_control() || character == ' ') {
             return Err(refused("an address without blanks (write %20)"));
         }

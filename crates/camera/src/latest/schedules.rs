@@ -1,5 +1,5 @@
-//! Every order in which a camera's thread and a caller can take turns at the newest frame, up to seven turns, against a model without
-//! threads. Turns do not overlap, because every operation on the cell holds one lock.
+//! All orders of up to seven steps of a camera's thread and a caller at the newest frame, compared with a model without
+//! threads. Steps do not overlap, because every operation on the cell holds one lock.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::channel;
@@ -8,16 +8,16 @@ use std::time::Duration;
 use super::LatestFrame;
 use super::tests::Driven;
 
-/// Longest schedule: 3 + 9 + … + 3⁷ = 3279 of them.
+/// Maximum number of steps: there are 3 + 9 + … + 3⁷ = 3279 schedules.
 const MAX_TURNS: u32 = 7;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Turn {
-    /// The camera gives a frame.
+    /// The camera delivers a frame.
     Frame,
-    /// The camera gives a torn one.
+    /// The camera delivers a torn frame.
     Torn,
-    /// The caller takes what is there.
+    /// The caller takes the current frame or error.
     Take,
 }
 
@@ -44,7 +44,8 @@ fn check(schedule: &[Turn]) {
     let (send, receive) = channel();
     let (asked, was_asked) = channel();
     let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
-    // Declared last, it is dropped first where an assertion fails: `latest` would wait for its thread for ever.
+    // Declared last, so that it is dropped first if an assertion fails; otherwise `latest` would wait for its thread
+    // for ever.
     let send = send;
     was_asked.recv().unwrap();
     let mut model = Model::default();
@@ -68,12 +69,12 @@ fn check(schedule: &[Turn]) {
                 continue;
             }
         }
-        // It asks again when the cell has what was sent.
+        // The camera is asked again after the cell has stored the last frame.
         was_asked.recv().unwrap();
     }
     assert!(!latest.has_ended(), "{schedule:?}");
     drop(send);
-    // All that was not taken is given before the end.
+    // Everything that was not taken is delivered before the end.
     while model.newest.is_some() || !model.errors.is_empty() {
         take(&mut model, Duration::ZERO);
     }
@@ -94,7 +95,7 @@ fn every_schedule_gives_what_the_cell_promises() {
     assert_eq!(num_schedules, 3279);
 }
 
-/// A caller that waits is woken by each thing that a camera gives, by its end, and by nothing else.
+/// A waiting caller is woken by each frame or error of a camera, by the camera's end, and by nothing else.
 #[test]
 fn a_caller_that_waits_is_woken() {
     for (sent, expected) in [(Some(Some(7)), Ok(Some(7))), (Some(None), Err(())), (None, Ok(None))] {
@@ -103,7 +104,7 @@ fn a_caller_that_waits_is_woken() {
         let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
         was_asked.recv().unwrap();
         let feeder = std::thread::spawn(move || {
-            // The caller waits by then; where it does not yet, the order is one of those above.
+            // By now the caller waits. If it does not, the order is one of those tested above.
             std::thread::sleep(Duration::from_millis(20));
             if let Some(sent) = sent {
                 send.send(sent).unwrap();

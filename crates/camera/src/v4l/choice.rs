@@ -1,4 +1,4 @@
-//! Choice among a node's formats and sizes.
+//! Chooses among a node's formats and sizes.
 
 use super::node::Format;
 use crate::options::{Encoding, OpenOptions};
@@ -10,8 +10,8 @@ pub(super) struct Choice {
     pub(super) size: (u32, u32),
 }
 
-/// The best of a node's formats. Criteria in this order: the wanted size, a sufficient frame rate, the smallest loss of
-/// the encoding. `None` if no format is supported.
+/// Chooses the best of a node's formats by these criteria, in this order: the wanted size, a sufficient frame rate, the
+/// smallest loss of the encoding. `None` if no format is supported.
 pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice> {
     let wanted = (options.width, options.height);
     let rated = formats.iter().filter_map(|format| {
@@ -19,7 +19,7 @@ pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice
         let (size, place) = format.sizes.nearest(wanted)?;
         let differs = size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
         let fps = format.max_fps.get(place).copied().filter(|fps| *fps > 0.0);
-        // Drivers round: 29.97 frames per second count as 30.
+        // Drivers round rates: 29.97 frames per second count as 30.
         let is_slow = options.fps.zip(fps).is_some_and(|(wanted, fps)| fps < wanted * 0.99);
         let rank = Encoding::ALL.iter().position(|known| *known == encoding);
         Some(((differs, is_slow, rank), Choice { encoding, size }))
@@ -42,7 +42,7 @@ mod tests {
         OpenOptions { width, height, fps, ..OpenOptions::default() }
     }
 
-    /// A common USB webcam: large uncompressed frames are slow.
+    /// A common USB webcam, whose large uncompressed frames have a low rate.
     fn webcam() -> Vec<Format> {
         vec![
             format(Some(Encoding::Mjpeg), &[(1280, 720), (640, 480)], &[30.0, 30.0]),

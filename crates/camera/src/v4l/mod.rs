@@ -1,10 +1,10 @@
 //! Cameras of Video4Linux 2, with the crate `linuxvideo`: Linux only.
 //!
 //! ```text
-//! /dev/video* ── nodes: what each offers ── choice: encoding and size ── stream: buffers to pictures
+//! /dev/video* ── nodes: formats of each ── choice: encoding and size ── stream: buffers to pictures
 //! ```
-//! The driver's frame counter and timestamps are not accessible: frames are numbered as they are read, with the time at
-//! which they were read.
+//! The driver's frame counter and timestamps are not accessible: frames are numbered when they are read, and have the
+//! time at which they were read.
 
 #[cfg_attr(not(target_os = "linux"), allow(dead_code))]
 mod choice;
@@ -22,7 +22,7 @@ pub fn nodes() -> Vec<Node> {
     nodes::nodes()
 }
 
-/// Empty: V4L2 exists only on Linux.
+/// No nodes: V4L2 exists only on Linux.
 #[cfg(not(target_os = "linux"))]
 pub fn nodes() -> Vec<Node> {
     Vec::new()
@@ -31,7 +31,7 @@ pub fn nodes() -> Vec<Node> {
 #[cfg(target_os = "linux")]
 pub(crate) use stream::open;
 
-/// Fails: V4L2 exists only on Linux.
+/// Always fails: V4L2 exists only on Linux.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn open(
     name: &crate::NodeName,

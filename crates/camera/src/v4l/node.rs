@@ -9,13 +9,13 @@ use crate::options::Encoding;
 pub struct Node {
     /// Path such as `/dev/video0`.
     pub path: PathBuf,
-    /// The card's name.
+    /// The name of the card.
     pub name: String,
-    /// The driver's name.
+    /// The name of the driver.
     pub driver: String,
     /// The bus address.
     pub bus: String,
-    /// Its formats, in the driver's order.
+    /// The formats of the node, in the driver's order.
     pub formats: Vec<Format>,
 }
 
@@ -24,13 +24,13 @@ pub struct Node {
 pub struct Format {
     /// V4L2's four-character code.
     pub fourcc: String,
-    /// The driver's description.
+    /// The driver's description of the format.
     pub description: String,
     /// The encoding, if supported.
     pub encoding: Option<Encoding>,
     /// Sizes in pixels: a list, or a range with steps.
     pub sizes: Sizes,
-    /// Maximum frame rate of each of [`Sizes::Listed`], in frames per second; 0 if the driver does not give it. Empty
+    /// Maximum frame rate of each of [`Sizes::Listed`], in frames per second; 0 if the driver does not state it. Empty
     /// for an unsupported encoding.
     pub max_fps: Vec<f64>,
 }
@@ -40,7 +40,7 @@ pub struct Format {
 pub enum Sizes {
     /// A list of width and height.
     Listed(Vec<(u32, u32)>),
-    /// All sizes in a range; the driver may round.
+    /// All sizes in a range, which the driver may round.
     Range {
         /// The smallest width and height.
         min: (u32, u32),
@@ -50,7 +50,7 @@ pub enum Sizes {
 }
 
 impl Sizes {
-    /// The size closest to the wanted one in number of pixels and shape, and its index in the list.
+    /// The size closest to the wanted one in area and aspect ratio, and its index in the list.
     pub(super) fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
         match self {
             Self::Listed(sizes) => {

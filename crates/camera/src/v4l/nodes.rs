@@ -1,4 +1,4 @@
-//! Enumerates the nodes of this machine.
+//! Lists the nodes of this machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -48,11 +48,11 @@ fn read_format(device: &Device, format: PixelFormat, description: &str) -> Forma
         Ok(FrameSizes::Stepwise(sizes) | FrameSizes::Continuous(sizes)) => {
             Sizes::Range { min: (sizes.min_width(), sizes.min_height()), max: (sizes.max_width(), sizes.max_height()) }
         }
-        // A driver without this list accepts the requested size, or returns the one that it uses instead.
+        // A driver without a list of sizes accepts the requested size, or returns the size that it uses instead.
         Err(_) => Sizes::Range { min: (1, 1), max: (u32::MAX, u32::MAX) },
     };
     let max_fps = match &sizes {
-        // Dozens of calls per size: only for supported formats.
+        // The query takes dozens of calls per size, so it is limited to supported formats.
         Sizes::Listed(sizes) if encoding.is_some() => sizes.iter().map(|size| max_fps(device, format, *size)).collect(),
         _ => Vec::new(),
     };

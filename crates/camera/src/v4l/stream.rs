@@ -1,4 +1,4 @@
-//! Frames from a node.
+//! Reads frames from a node.
 
 use std::path::PathBuf;
 use std::thread::sleep;
@@ -19,16 +19,16 @@ use crate::options::{Encoding, OpenOptions};
 use crate::source::{Missing, Source, Taken};
 use crate::yuv::{rgb24_to_rgb, yuyv_to_rgb};
 
-/// Interval of checks for a filled buffer: the system's own wait has no timeout.
+/// Interval between checks for a filled buffer: the operating system's own wait has no timeout.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// If no picture was read for longer than this, the filled buffers are dropped: they are too old.
+/// If no picture was read for longer than this, the filled buffers are too old and are dropped.
 const MAX_AGE: Duration = Duration::from_millis(200);
 /// V4L2's exposure times are in units of 100 µs.
 const EXPOSURE_UNITS_PER_SEC: f64 = 1e4;
 /// V4L2_EXPOSURE_MANUAL.
 const EXPOSURE_MANUAL: i32 = 1;
 
-/// Opens a node and starts it.
+/// Opens a node and starts its stream.
 ///
 /// # Errors
 /// [`CameraError::Open`] if there is no such node or it has no supported format, [`CameraError::Setting`] if it rejects
@@ -57,7 +57,7 @@ fn all_encodings() -> String {
     Encoding::ALL.map(fourcc).join(" or ")
 }
 
-/// The node's path, or text that says why there is none.
+/// The path of the node, or text that says why there is none.
 fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
     if let NodeName::Path(path) = name {
         return Ok(path.clone());
@@ -80,12 +80,15 @@ fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
         (false, _) => format!("expected {expected}, found {}", found.join(", ")),
         (true, true) => format!("expected {expected}, found no /dev/video*"),
         (true, false) => {
-            format!("expected {expected}, found {} nodes in /dev, none of which opens and captures", paths().len())
+            format!(
+                "expected {expected}, found {} nodes in /dev, none of which can be opened and captures pictures",
+                paths().len()
+            )
         }
     })
 }
 
-/// Sets fixed exposure and white balance if requested.
+/// Sets a fixed exposure and white balance if requested.
 fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Result<(), CameraError> {
     let mut set = |setting: &'static str, values: [(Cid, i32); 2]| {
         for (control, value) in values {
@@ -103,7 +106,7 @@ fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Re
             }
             device
                 .write_control_raw(control, value)
-                .map_err(|error| refused(format!("that it refuses {value}: {error}")))?;
+                .map_err(|error| refused(format!("that it rejects {value}: {error}")))?;
         }
         Ok(())
     };
@@ -131,19 +134,19 @@ impl Stream {
     fn start(device: Device, choice: Choice, options: &OpenOptions) -> Result<Self, (&'static str, std::io::Error)> {
         let format = PixelFormat::from_fourcc(choice.encoding.fourcc());
         let wanted = PixFormat::new(choice.size.0, choice.size.1, format);
-        let capture = device.video_capture(wanted).map_err(|error| ("does not take the format", error))?;
+        let capture = device.video_capture(wanted).map_err(|error| ("does not accept the format", error))?;
         let given = capture.format();
         let (width, height) = (given.width(), given.height());
         if given.pixel_format() != format || width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
             let found = format!("expected {format}, found {} of {width} × {height} pixels", given.pixel_format());
-            return Err(("gives another format", std::io::Error::other(found)));
+            return Err(("uses another format", std::io::Error::other(found)));
         }
         let bytes_per_row = given.bytes_per_line() as usize;
         if let Some(fps) = options.fps {
-            // The driver uses its nearest frame rate; the frames' times show which. A driver without frame rates
-            // returns an error.
+            // The driver uses the nearest rate that it supports, which is visible in the times of the frames. A driver
+            // without frame rates returns an error.
             let interval = Fract::new(1000, (fps * 1000.0).round() as u32);
-            capture.set_frame_interval(interval).map_err(|error| ("takes no frame rate", error))?;
+            capture.set_frame_interval(interval).map_err(|error| ("does not accept the frame rate", error))?;
         }
         let stream = capture.into_stream().map_err(|error| ("does not start", error))?;
         Ok(Self { stream, encoding: choice.encoding, width, height, bytes_per_row, last_read: Instant::now() })

@@ -1,4 +1,4 @@
-//! A server that runs a script, and distinguishable pictures.
+//! A server that runs a script, and pictures that can be told apart.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -14,7 +14,7 @@ use sdg_camera::{Address, Camera, CameraError, Frame, OpenOptions};
 /// Time without a frame after which a camera of these tests is stale.
 pub const STALL_TIMEOUT: Duration = Duration::from_millis(400);
 
-/// The actions on a connection after its request was read.
+/// Actions on a connection after its request was read.
 pub type Script = Box<dyn Fn(&mut TcpStream) + Send + Sync>;
 
 /// A JPEG of one level of grey.
@@ -32,7 +32,7 @@ pub fn part(level: u8, has_length: bool) -> Vec<u8> {
     [b"--cut\r\nContent-Type: image/jpeg\r\n", length.as_bytes(), b"\r\n", &picture, b"\r\n"].concat()
 }
 
-/// The level of a frame.
+/// The grey level of a frame.
 pub fn level_of(frame: &Frame) -> u8 {
     frame.picture.get_pixel(20, 20)[0]
 }
@@ -46,7 +46,8 @@ pub fn open(address: &str) -> Box<dyn Camera> {
     try_open(address).unwrap()
 }
 
-/// Answers on 127.0.0.1 until it is dropped, one connection at a time; connections closed by the client are abandoned.
+/// A server on 127.0.0.1, one connection at a time, until it is dropped. Connections closed by the client are
+/// abandoned.
 pub struct Server {
     port: u16,
     is_stopped: Arc<AtomicBool>,
@@ -54,7 +55,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Each connection runs its script; later ones run `further`.
+    /// Starts a server. Each connection runs its script; later ones run `further`.
     pub fn start(scripts: Vec<Script>, further: Script) -> Self {
         Self::start_at(0, scripts, further)
     }
@@ -65,7 +66,7 @@ impl Server {
         Self::serve(port, move |mut stream, _| {
             let next = scripts.next();
             let further = Arc::clone(&further);
-            // In a thread, because scripts sleep.
+            // A thread for each connection, because scripts sleep.
             std::thread::spawn(move || match next {
                 Some(script) => script(&mut stream),
                 None => further(&mut stream),
@@ -73,7 +74,7 @@ impl Server {
         })
     }
 
-    /// Each request is passed to the closure.
+    /// Starts a server that passes each request to the closure.
     pub fn start_with_requests(answer: impl Fn(&str, &mut TcpStream) + Send + 'static) -> Self {
         Self::serve(0, move |mut stream, request| answer(&request, &mut stream))
     }

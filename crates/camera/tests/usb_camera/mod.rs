@@ -31,7 +31,7 @@ const UNLINKED: i32 = -104;
 pub struct Settings {
     /// 1: manual.
     pub exposure_mode: u32,
-    /// In units of 100 µs.
+    /// Exposure time in units of 100 µs.
     pub exposure: u32,
     pub white_balance_auto: u32,
     pub white_balance_kelvin: u32,
@@ -48,7 +48,7 @@ pub struct UsbCamera {
 impl UsbCamera {
     pub fn plug_in() -> Self {
         let (cable, kernels_end) = UnixStream::pair().unwrap();
-        // Port, socket, device number, speed: 3 is high speed. After a device was unplugged, its port becomes free with
+        // Port, socket, device number, speed: 3 is high speed. When a device is unplugged, its port becomes free after
         // a delay.
         let told = format!("0 {} 65537 3", kernels_end.as_raw_fd());
         let start = Instant::now();
@@ -102,7 +102,7 @@ struct Device {
     probe: [u8; 26],
     /// Requests for stream data: sequence number and length.
     waiting: VecDeque<(u32, usize)>,
-    /// The frame being sent, and the position in it.
+    /// The frame that is being sent, and the position in it.
     payload: Vec<u8>,
     sent: usize,
     num_frames: u32,
@@ -180,7 +180,7 @@ impl Device {
         self.cable.write_all(&bytes).ok()
     }
 
-    /// A control request: the data to return, empty for a request with data; `None` for an unknown request.
+    /// Answers a control request: the data to return, empty if the request carries data; `None` for an unknown request.
     fn control(&mut self, setup: [u8; 8], data: &[u8]) -> Option<Vec<u8>> {
         let [kind, request, value_low, value_high, index_low, index_high, ..] = setup;
         match (kind, request) {
@@ -275,7 +275,7 @@ impl Device {
     }
 }
 
-/// Three bars, a corner that differs between frames, and no Huffman tables.
+/// A JPEG with three bars, a corner that differs between frames, and no Huffman tables.
 fn webcam_jpeg((width, height): (u16, u16), number: u32) -> Vec<u8> {
     let (width, height) = (u32::from(width), u32::from(height));
     let picture = RgbImage::from_fn(width, height, |x, y| {
@@ -284,7 +284,7 @@ fn webcam_jpeg((width, height): (u16, u16), number: u32) -> Vec<u8> {
     let mut jpeg = Vec::new();
     JpegEncoder::new_with_quality(&mut jpeg, 95).encode_image(&picture).unwrap();
     let (mut bare, mut at) = (jpeg[..2].to_vec(), 2);
-    // Segments up to the start of scan; 0xc4 are the tables.
+    // The segments up to the start of scan; 0xc4 marks the tables.
     while jpeg[at + 1] != 0xda {
         let end = at + 2 + usize::from(u16::from_be_bytes([jpeg[at + 2], jpeg[at + 3]]));
         if jpeg[at + 1] != 0xc4 {

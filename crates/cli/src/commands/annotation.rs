@@ -98,7 +98,7 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The format given by `--format`, else by the file name's extension.
+/// The format given by `--format`, or else by the file name's extension.
 fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
     let writable = AnnotationFormat::ALL.into_iter().filter(|format| *format != AnnotationFormat::OpenDr);
     match &args.format {
@@ -118,8 +118,8 @@ fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
     }
 }
 
-/// Reads the marks, with size and name of their image: from the image itself if it is given, else from the file's only
-/// entry.
+/// Reads the marks and the size and name of their image: from the image itself if it is given, otherwise from the
+/// file's only entry.
 fn read_marks(
     args: &ConvertAnnotationArgs,
     input: &AnnotationFile,
@@ -142,7 +142,7 @@ fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Resul
     match declared.len() {
         1 => Ok(declared.remove(0)),
         0 => Err(Usage(format!(
-            "--image: {} does not say how large its image is; expected the image",
+            "--image: {} does not state the size of its image; expected the image",
             args.input.display()
         ))
         .into()),

@@ -29,8 +29,8 @@ pub struct AugmentArgs {
     /// The augmentation: edge (used in teaching), or paper (as in the paper)
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Write the held-back samples instead, on which `sdg teach` with the same seed tests the finished model, of at
-    /// most 640x480 pixels; its figures are of the first 40, for model S of the first 24
+    /// Write the held-out samples instead, of at most 640x480 pixels: on them, `sdg teach` with the same seed tests the
+    /// finished model. It uses the first 40, for model S the first 24
     #[arg(long, conflicts_with = "preset")]
     pub held_back: bool,
     /// Seed of all random choices
@@ -44,7 +44,7 @@ pub struct AugmentArgs {
 /// The file with the marks of all samples.
 const ANNOTATIONS: &str = "annotations.json";
 
-/// Writes the pictures first and the list of their marks last, so that an interrupted run leaves no list of missing
+/// Writes the pictures first and the list of their marks last: an interrupted run leaves no list that names missing
 /// pictures.
 pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     let config = match args.preset.as_str() {

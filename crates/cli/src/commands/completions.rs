@@ -19,7 +19,7 @@ pub struct CompletionsArgs {
 pub fn run(args: &CompletionsArgs, mut command: clap::Command) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "sdg", &mut script);
-    // Written in one call, so that a closed pipe is returned as an error; the generator would panic.
+    // Written in one call, so that a closed pipe is returned as an error; the generator itself would panic.
     std::io::stdout().lock().write_all(&script)?;
     Ok(Outcome::Done)
 }

@@ -32,30 +32,30 @@ use crate::shared_args::{ComputeArgs, ToldHeightArgs};
 /// `sdg grasp`
 #[derive(Debug, Args)]
 pub struct GraspArgs {
-    /// The arm: HOST or HOST:PORT of a Franka, or sim for a simulated one; default: the address in the workcell's file
+    /// The arm: HOST or HOST:PORT of a Franka, or sim for a simulated one; default: the address in the workcell file
     #[arg(long, value_name = "ADDRESS|sim")]
     pub robot: Option<RobotChoice>,
     /// The camera, as for sdg detect --from. With --robot sim: sim:PART or sim:PART?seed=N, a part on the simulated
     /// arm's table
     #[arg(long, value_name = "ADDRESS")]
     pub from: Address,
-    /// The camera's file; default: the one named in the workcell's file
+    /// The camera file; default: the one named in the workcell file
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
     /// A grasp model that sdg teach made from photos of a calibrated camera
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
-    /// The workcell's file: robot, tool, camera, table, the arm's workspace and look-out poses
+    /// The workcell file: robot, tool, camera, table, the arm's workspace and look-out poses
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Put the part down at this place of the workcell's file, and check its position with the camera: NAME, or
-    /// NAME:CELL for a cell of a tray, counted from 1 along the tray's x axis
+    /// Put the part down at this place of the workcell file, and check its position with the camera: NAME, or NAME:CELL
+    /// for a cell of a tray, counted from 1 along the tray's x axis
     #[arg(long, value_name = "NAME")]
     pub place: Option<String>,
     /// The part's height
     #[command(flatten)]
     pub height: ToldHeightArgs,
-    /// Descend softly, until contact at most, over the last 2 cm: for a table whose height is not known to a millimetre
+    /// Descend softly over the last 2 cm, and stop at contact: for a table whose height is not known to a millimetre
     #[arg(long)]
     pub soft: bool,
     /// Plan the grasp from the arm's current posture, draw it, and ask for confirmation before anything moves
@@ -64,7 +64,7 @@ pub struct GraspArgs {
     /// Do not ask for confirmation; for programs
     #[arg(long)]
     pub yes: bool,
-    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    /// Fraction of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     pub speed: f64,
     /// Maximum age of a picture on which a motion is based
@@ -85,7 +85,7 @@ pub struct GraspArgs {
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Settings of the camera; its size is that of the camera's file
+    /// Settings of the camera; its size is that of the camera file
     #[command(flatten)]
     pub request: RequestArgs,
 }
@@ -206,7 +206,7 @@ fn simulated(_args: &GraspArgs, _prepared: &Prepared, _interrupt: &Interrupt) ->
     .into())
 }
 
-/// One grasp with any arm. A real arm, which has an address, moves only after a person has confirmed.
+/// One grasp with any arm. A real arm, which has an address, moves only after confirmation by a person.
 fn attempt<A: CompliantArm, P: Pictures<A>>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -266,7 +266,7 @@ fn dry_run<A: Arm>(
     let camera_pose = prepared.camera.pose;
     let place = prepared.place.as_ref();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, camera_pose, &prepared.config, place)?;
-    eprintln!("what would be done:");
+    eprintln!("planned, not executed:");
     print_plan(&plan, target.is_some())?;
     #[cfg(feature = "simulation")]
     if let Err(missing) = sdg_simulation::load() {
@@ -288,7 +288,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     if let Some(height) = grasp.height.as_ref().and_then(|height| height.settled) {
         let height_mm = 1e3 * (height.height_m - prepared.workcell.table_height_m);
         let (sigma_mm, source) = (1e3 * height.sigma_m, height.source.name());
-        eprintln!("its marks lie {height_mm:.1} ± {sigma_mm:.1} mm over the table, as {source}");
+        eprintln!("its marks are {height_mm:.1} ± {sigma_mm:.1} mm above the table, as {source}");
     }
     let took = format!("the arm took {secs:.1} s of {:.1} s since the start", clock::elapsed_secs());
     match (failed, &prepared.place) {
@@ -302,7 +302,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
         (None, Some((goal, _))) => {
             let where_it_lies = match (beside, goal.bin_m) {
                 (Some(_), Some(_)) => "is in".to_owned(),
-                (None, _) => "was released over".to_owned(),
+                (None, _) => "was released above".to_owned(),
                 (Some(error), None) => format!(
                     "lies {:.1} mm and {:.1}° beside its place in",
                     error.distance_m() * 1e3,
@@ -320,7 +320,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     }
 }
 
-/// Whether a picture was taken and did not contain the part; a motion that was refused before is a different case.
+/// Whether a picture was taken and did not contain the part. If a motion was rejected before, no picture was taken.
 fn is_nothing_found(report: &GraspReport) -> bool {
     let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
     is_look && report.targets.last() == Some(&None)
@@ -372,7 +372,7 @@ fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value 
     object
 }
 
-/// The marks' height over the table, and its source.
+/// The height of the marks above the table, and its source.
 fn height_json(height: &HeightReport, table_height_m: f64) -> Value {
     let over_table_mm = |height_m: f64| 1e3 * (height_m - table_height_m);
     json!({

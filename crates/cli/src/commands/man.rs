@@ -1,4 +1,4 @@
-//! `sdg man`: manual pages, generated from the same definitions as the help.
+//! `sdg man`: manual pages, generated from the definitions of the help.
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -15,7 +15,7 @@ use crate::exit::Outcome;
 use crate::interrupt::Interrupt;
 use crate::parts::part_named;
 
-/// Interval at which Ctrl-C and the server are checked.
+/// Interval between checks of Ctrl-C and of the server.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// `sdg simulate`

@@ -31,8 +31,8 @@ use crate::teaching_progress::TeachingProgress;
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model, by letter or name: A or crop (detects a box, turn from the box's crop), B or box (box, turn
-    /// from keypoints), C or keypoints, D or mask (mask, turn from texture or outline), S or shape (no network:
+    /// The grasp model, by letter or name: A or crop (detects a box, angle from the box's crop), B or box (box, angle
+    /// from keypoints), C or keypoints, D or mask (mask, angle from texture or outline), S or shape (no network:
     /// searches the whole image for the demonstration; ready at once)
     #[arg(long, default_value = "C", value_name = "NAME")]
     pub model: String,
@@ -47,8 +47,8 @@ pub struct TeachArgs {
     /// --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
-    /// Teach only this part of --demos, without the page, so that several machines can share the parts; repeat for
-    /// several
+    /// Teach only this part of --demos, without the page, so that several machines can each teach some of the parts;
+    /// repeat for several
     #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
@@ -69,7 +69,7 @@ pub struct TeachArgs {
     /// Maximum seconds for training the network
     #[arg(long, value_name = "SECS", value_parser = seconds)]
     pub time_budget: Option<f64>,
-    /// Number of turns, within a full rotation, in which the part looks the same: 1 for most parts, 4 for a square,
+    /// Number of angles, within a full rotation, at which the part looks the same: 1 for most parts, 4 for a square,
     /// full for a disc
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
@@ -79,14 +79,14 @@ pub struct TeachArgs {
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts
-    /// if its grasp point and at least half of its area are in the region. The region is stored in the model's file,
-    /// for pictures of the photo's size
+    /// if its grasp point and at least half of its area are in the region. The region is stored in the model file, for
+    /// pictures of the photo's size
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = region)]
     pub region: Option<SearchRegion>,
     /// The calibrated camera that took the photos
     #[command(flatten)]
     pub camera: TaughtCameraArgs,
-    /// Number of optimiser steps, in place of the preset's
+    /// Number of optimiser steps, instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
     /// Initial weights: base weights made by `make base-weights`, any file that `sdg weights convert` reads or writes,
@@ -108,13 +108,13 @@ pub struct TeachArgs {
     pub json: bool,
 }
 
-/// Parses a number of turns, or `full` for a part whose rotation is not visible.
+/// Parses a number of angles, or `full` for a part whose rotation is not visible.
 pub(super) fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     match (text, text.parse::<u32>()) {
         ("full", _) => Ok(RotationalSymmetry::Full),
         (_, Ok(1)) => Ok(RotationalSymmetry::None),
         (_, Ok(count @ 2..=360)) => Ok(RotationalSymmetry::Fold(count)),
-        _ => Err("expected 1 to 360 equal turns, or full".to_owned()),
+        _ => Err("expected 1 to 360 equal angles, or full".to_owned()),
     }
 }
 
@@ -138,7 +138,7 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     Ok(options)
 }
 
-/// Teaches with progress on standard error, writes the model's file, and tests it on held-back samples.
+/// Teaches with progress on standard error, writes the model file, and tests the model on held-out samples.
 ///
 /// # Errors
 /// Errors of teaching as [`GraspError`]; the file cannot be written.
@@ -229,25 +229,25 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        // The time that a person waits, not only that of the teaching.
+        // All the time that a person waits, not only the teaching.
         let (seconds, training) = (clock::elapsed_secs(), taught_words::training(&taught));
         let object = taught.model.object();
         println!("taught \"{object}\" in {seconds:.1} s, of which the teaching took {:.1} s{training}", facts.seconds);
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
-        println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
+        println!("searches sizes from {} to {} times the size in the photo", tolerance.start(), tolerance.end());
         if let Some(region) = taught.model.region() {
-            println!("searches {region} of pictures as large as the photo");
+            println!("searches {region} of pictures of the photo's size");
         }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
             println!(
-                "refuses {refused} of {pictures} pictures without the part; for them, every score is lowered by {:.1} log-odds",
+                "refuses {refused} of {pictures} pictures without the part; for this, every score is lowered by {:.1} log-odds",
                 -log_odds
             );
         }
         if let Some(lengths) = facts.lengths {
             println!(
-                "knows its size: marks {:.1} mm above the table, {:.3} mm a pixel; grasped {:.1} mm above the table",
+                "knows its size: marks {:.1} mm above the table, {:.3} mm per pixel; grasped {:.1} mm above the table",
                 1e3 * lengths.mark_height_m,
                 1e3 / lengths.pixels_per_m,
                 1e3 * lengths.grasp_height_m
@@ -318,11 +318,7 @@ pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) ->
         return Ok(None);
     }
     let Some(network) = options.network() else {
-        return Err(Usage(format!(
-            "--base-weights: model {} has no network that could start from weights",
-            options.kind
-        ))
-        .into());
+        return Err(Usage(format!("--base-weights: model {} has no network for initial weights", options.kind)).into());
     };
     if let Some((own, origin)) = base_weights::read_own(path, options, &args.reinitialized)? {
         options.start = Start::Weights(own);

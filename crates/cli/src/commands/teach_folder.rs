@@ -16,7 +16,7 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
 
-/// Teaches the parts that have no model yet; then, unless `--part` selects single parts, runs each model on every
+/// Teaches the parts that have no model yet. Then, unless `--part` selects single parts, runs each model on every
 /// photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
@@ -35,7 +35,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
             Some(outcome) => outcome,
             None => {
                 let Some((model, outcome)) = teach_part(part, options, &|| interrupt.is_requested()) else {
-                    bail!("interrupted: the same command continues with {}", part.name);
+                    bail!("interrupted: run the same command again to continue with {}", part.name);
                 };
                 store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
                 outcome
@@ -77,7 +77,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The parts selected by `--part`, or all.
+/// The parts selected by `--part`, or all parts.
 fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Vec<&'a PartDemonstrations>> {
     if args.parts.is_empty() {
         return Ok(parts.iter().collect());
@@ -109,7 +109,7 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
     }))
 }
 
-/// Reports single parts. A part without a model makes the call fail, as in teaching one part.
+/// Reports single parts. If a part has no model, the call fails, as it does when one part is taught.
 fn told(args: &TeachArgs, outcomes: Vec<(String, PartOutcome)>) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =

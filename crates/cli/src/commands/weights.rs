@@ -109,7 +109,7 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     }
 }
 
-/// Adds the names of the options that the error is about.
+/// Adds the names of the options that the error concerns.
 fn in_options(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
         Some(ConfigError::UnknownPreset { .. }) => Usage(format!("--preset: {error}")).into(),
@@ -120,7 +120,7 @@ fn in_options(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// The network to fill, and the metadata that identifies it.
+/// The network to fill, and the metadata that identify it.
 fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, BTreeMap<String, String>)> {
     let naming = naming_of(checkpoint)?;
     if is_backbone_alone(checkpoint, naming) && args.preset.is_none() && args.config.is_none() {
@@ -136,7 +136,7 @@ fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, 
     Ok((architecture_of(&config), metadata))
 }
 
-/// Prints the report first, complete even if tensors are missing; then writes the file, or nothing.
+/// Prints the whole report first, even if tensors are missing, and then writes the file unless there is an error.
 fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
@@ -183,7 +183,7 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
 fn inspect(args: &InspectArgs) -> Result<Outcome> {
     let (source, checkpoint) = open(&args.file)?;
     let sha256 = sha256_of(&args.file).with_context(|| args.file.display().to_string())?;
-    // Tensor names that are not recognised are shown too.
+    // Unknown names of tensors are shown as well.
     let naming = naming_of(&checkpoint).ok();
     let types: Vec<_> = checkpoint.element_types().iter().map(|(e, count)| format!("{count} {}", e.name())).collect();
     let mut stdout = std::io::stdout().lock();
@@ -228,7 +228,7 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Builds the detector, loads the weights and compares the outputs; writes nothing.
+/// Builds the detector, loads the weights and compares the outputs. Writes no file.
 fn verify(args: &VerifyArgs) -> Result<Outcome> {
     let config = args.config.as_deref().map(read_config).transpose()?;
     let image = sdg_inputs::read_image(&args.image)?;
@@ -250,7 +250,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     }
 }
 
-/// Any text of a file, on one line.
+/// A text from a file, on one line.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }

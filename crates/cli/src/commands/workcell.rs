@@ -1,4 +1,4 @@
-//! `sdg workcell`: shows a workcell's file.
+//! `sdg workcell`: shows a workcell file.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::exit::Outcome;
 /// The commands of `sdg workcell`.
 #[derive(Debug, Subcommand)]
 pub enum WorkcellCommand {
-    /// Draw the cell from above: table, workspace, places, obstacles, look-out poses, and the part of the table that
+    /// Draw the cell from above: table, workspace, places, obstacles, look-out poses, and the area of the table that
     /// the hand reaches
     Show(ShowArgs),
 }
@@ -19,10 +19,10 @@ pub enum WorkcellCommand {
 /// `sdg workcell show`
 #[derive(Debug, Args)]
 pub struct ShowArgs {
-    /// The workcell's file
+    /// The workcell file
     #[arg(value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Height of the tcp over the table for which reach is computed, with the hand pointing straight down
+    /// Height of the tcp above the table for which reach is computed, with the hand pointing straight down
     #[arg(long, value_name = "MM", default_value_t = 20.0)]
     pub height_mm: f64,
     /// Size of a square of the map of reach

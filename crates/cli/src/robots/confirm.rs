@@ -1,4 +1,4 @@
-//! Asks a person for permission to move the arm.
+//! Asks for permission to move the arm.
 
 use std::io::{BufRead, IsTerminal, Write};
 
@@ -12,7 +12,7 @@ pub(crate) enum Consent {
     Refused,
 }
 
-/// Asks on the terminal; `is_yes` skips the question. If stdin is not a terminal, the answer is no.
+/// Asks on the terminal; `is_yes` skips the question. If stdin is not a terminal, the permission is refused.
 ///
 /// # Errors
 /// The terminal cannot be read.

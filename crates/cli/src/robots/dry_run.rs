@@ -4,7 +4,7 @@ use anyhow::{Result, anyhow};
 use sdg_cell::DryRun;
 use sdg_robot::{Arm, PlannedAction};
 
-/// Prints one line per motion, and the end of the plan.
+/// Prints one line for each motion, and the end of the plan.
 ///
 /// # Errors
 /// A step cannot be planned.
@@ -42,7 +42,7 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     Ok(())
 }
 
-/// Drawing needs the simulator.
+/// Draws the plan, for which the simulator is needed.
 #[cfg(not(feature = "simulation"))]
 pub(crate) fn draw_dry_run(
     _plan: &DryRun,

@@ -1,4 +1,4 @@
-//! Arms as commands use them: selection, camera pictures, confirmation by a person, and records after an error.
+//! Arms for commands: selection, camera pictures, confirmation, and records after an error.
 
 mod confirm;
 mod dry_run;
@@ -23,10 +23,10 @@ pub(crate) use sdg_evaluation::draw_dry_run;
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 
-/// `--robot`: an address, or the simulated arm of this program.
+/// `--robot`: an address, or the simulated arm in this program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RobotChoice {
-    /// An arm in MuJoCo that lives as long as the command.
+    /// An arm in MuJoCo that exists as long as the command runs.
     Sim,
     /// A Franka on the network.
     Network(RobotAddress),
@@ -44,7 +44,7 @@ impl FromStr for RobotChoice {
 }
 
 impl RobotChoice {
-    /// The arm named on the command line, else in the workcell's file.
+    /// The arm given on the command line, or else in the workcell file.
     ///
     /// # Errors
     /// [`Usage`] if neither names one.
@@ -64,7 +64,7 @@ pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
     if no_realtime { Scheduling::Ordinary } else { Scheduling::RealTime }
 }
 
-/// `--speed`.
+/// The pace from `--speed`.
 ///
 /// # Errors
 /// [`Usage`] for a value out of range.
@@ -72,13 +72,14 @@ pub(crate) fn pace(speed: f64) -> Result<Pace> {
     Pace::at_speed(speed).map_err(|error| Usage(format!("--{error}")).into())
 }
 
-/// A watch that stops the arm on Ctrl-C.
+/// Creates a watch that stops the arm on Ctrl-C.
 pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
     let interrupt = interrupt.clone();
     Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
 }
 
-/// Writes the arm's last second of states after an error and prints the path; does nothing if no state was received.
+/// Writes the arm's last second of states after an error and prints the file's path. Does nothing if no state was
+/// received.
 ///
 /// # Errors
 /// The file cannot be written.

@@ -9,7 +9,7 @@ use crate::parts::part_named;
 /// The scene of an address, given without its `sim:`.
 ///
 /// # Errors
-/// Unknown part or option.
+/// The part or an option is unknown.
 pub(crate) fn simulated_scene(text: &str) -> Result<SceneVariation> {
     let (part, options) = text.split_once('?').unwrap_or((text, ""));
     let part = part_named("--from", part)?;

@@ -1,4 +1,4 @@
-//! `sdg camera calibrate --from`: the page that shows the next useful view.
+//! `sdg camera calibrate --from`: the page that shows the view that is needed next.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -32,7 +32,7 @@ fn the_page_shows_the_board_and_what_is_lacking() {
         let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut Random(k as u64));
         picture.save(frames.join(format!("{k}.png"))).unwrap();
     }
-    // The frames repeat, so that the page always has a picture.
+    // The frames repeat, so that there is always a picture.
     let from = format!("dir:{}?fps=4&loop", frames.display());
     let arguments = ["camera", "calibrate", "--from", &from, "--no-browser", "--out", "camera.yaml"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));

@@ -1,4 +1,5 @@
-//! Corrections of marks: strokes over an outline, the box fitted to it, the gripper aligned with a straight part.
+//! Corrections of marks: strokes across an outline, the box fitted to the outline, and the gripper aligned with a
+//! straight part.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};
@@ -8,13 +9,13 @@ use serde_json::json;
 
 use super::page::Page;
 
-/// A straight part of one of several shapes, and its pose.
+/// A straight part in one of several shapes, and its pose.
 struct Straight {
     image: RgbImage,
     bbox: BoundingBox,
-    /// Angle of its axis, in degrees.
+    /// Angle of the axis, in degrees.
     angle_deg: f64,
-    /// A point on its shank, slightly off the axis, as a person clicks.
+    /// A point on the shank, slightly off the axis, as a person clicks.
     click: Point2<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! The front page's animation, from the photo to the detected part, as `make film` writes it.
+//! The animation of the front page, from the photo to the detected part; `make film` writes it.
 
 use std::process::Command;
 
@@ -9,9 +9,9 @@ use sdg_report::{Animation, AnimationOptions, Color, draw_label};
 use super::page::{HOLD, Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// Seconds that each picture is shown.
+/// Time for which each picture is shown, in seconds.
 const STANDS: f64 = 1.8;
-/// The held-back sample that is searched: another table, with objects that resemble the part.
+/// The held-out sample that is searched: another table, with objects that resemble the part.
 const SEED: &str = "3";
 const SAMPLE: &str = "000003.png";
 
@@ -68,7 +68,7 @@ fn from_a_photo_to_the_found_part() {
     std::fs::write(repository().join("datasets/pictures/page.gif"), gif.gif()).unwrap();
 }
 
-/// A screenshot of the browser, with a caption below.
+/// A screenshot of the browser with a caption below it.
 fn captioned(page: &Page, words: &str) -> RgbImage {
     page.settle_frames();
     let path = page.folder.path().join("shot.png");

@@ -1,4 +1,4 @@
-//! All actions of the mouse, by keys alone.
+//! All actions of the mouse, with keys alone.
 
 use serde_json::json;
 
@@ -18,7 +18,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let browser = &page.browser;
     let press = |keys: &[&str]| browser.press(keys).unwrap();
 
-    // A box in the middle; first its corner is moved, then the box.
+    // A box in the centre; first its corner is moved, then the box.
     press(&["b"]);
     press(&[ENTER]);
     let start = page.saved().bbox;
@@ -28,11 +28,11 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let corner = page.saved().bbox;
     assert_eq!([corner.x2 - start.x2, corner.y2 - start.y2, corner.x1 - start.x1], [-1.0, 10.0, 0.0]);
 
-    // Whether an outline is found in such a box does not matter here.
+    // It does not matter whether an outline is found in such a box.
     if page.saved().outline.is_some() {
         page.click("[data-clear=outline]");
     }
-    // A button pressed earlier has the focus; the key of a mark moves the focus to the photo.
+    // A button that was pressed earlier has the focus; the key of a mark moves the focus to the photo.
     browser.run("document.getElementById('undo').focus()", &[]).unwrap();
     press(&["g"]);
     press(&[ENTER]);
@@ -49,7 +49,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     assert!((moved.jaw_width.unwrap() - placed.jaw_width.unwrap() - 1.0).abs() < 0.02);
     assert!((b.center().x - a.center().x + 1.0).abs() < 0.02 && (b.center().y - a.center().y).abs() < 0.02);
 
-    // Numbers can be typed too.
+    // Numbers can also be typed.
     page.fill("#grasp-width", "44");
     assert_eq!(page.saved().jaw_width, Some(44.0));
 

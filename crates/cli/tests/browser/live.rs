@@ -1,4 +1,4 @@
-//! A photo is taken with a camera, marked and taught, and the model is tried on the camera's pictures.
+//! A photo is taken with a camera, marked and taught, and the model is tried on pictures of that camera.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::page::{BOX, HOLD, Page, shipped_photo};
 use super::photo_to_grasp::patiently;
 
 /// The wrist camera in the pose of the shipped photos: straight down from 0.58 m; right in the picture is -y of the
-/// base.
+/// base frame.
 const CAMERA: &str = include_str!("../wrist.yaml");
 
 fn picture() -> RgbImage {
@@ -19,7 +19,7 @@ fn picture() -> RgbImage {
 /// Replaces the picture of the `dir:` camera.
 fn show(table: &Path, name: &str, picture: &RgbImage) {
     let before: Vec<_> = std::fs::read_dir(table).unwrap().map(|entry| entry.unwrap().path()).collect();
-    // Hidden while it is written, as other programs do.
+    // The file is hidden while it is written, as other programs do.
     let hidden = table.join(format!(".{name}"));
     picture.save(&hidden).unwrap();
     std::fs::rename(hidden, table.join(name)).unwrap();
@@ -61,14 +61,14 @@ fn a_photo_from_the_camera_is_marked_taught_and_tried_live() {
     page.screenshot("live-2-marked");
     teach(&page);
 
-    // The part is now rotated by half a turn, at another place.
+    // The part is now rotated by 180°, at another position.
     show(&table, "b.png", &image::imageops::rotate180(&picture()));
     page.click("#go-try");
     found_at(&page, [640.0 - HOLD[0], 480.0 - HOLD[1]]);
     assert!(page.text("#live-time").contains(" ms"), "{}", page.text("#live-time"));
     page.screenshot("live-3-tried");
     page.assert_accessible("tried live");
-    // And back: the drawing follows.
+    // The part is back, and the drawing follows.
     show(&table, "c.png", &picture());
     found_at(&page, HOLD);
 
@@ -113,7 +113,7 @@ fn found_at(page: &Page, place: [f64; 2]) {
             && document.getElementById('live-found').innerText.includes('Found the part')",
         place[0], place[1]
     );
-    // Text and drawing are of the same frame; the next frame may change both between two queries.
+    // Text and drawing are of the same frame; a new frame might change both between two queries.
     patiently(page, "the grasp where the part is, and the words", &drawn);
 }
 
@@ -126,7 +126,7 @@ fn pause_and_keep(page: &Page, table: &Path) {
     page.wait_for("its grasp", "return document.getElementById('strip').innerText.includes('1 found')");
     page.browser.press(&["l"]).unwrap();
     page.wait_for("nothing", "return document.getElementById('live-found').innerText.includes('nothing to grasp')");
-    // The kept picture can be viewed, and the camera returns to the stage.
+    // The kept picture can be viewed, and then the camera is shown again.
     page.click("#strip button");
     page.wait_for("the kept picture", "return document.getElementById('photo').alt.startsWith('Photo live-')");
     page.wait_for("its grasp", "return document.getElementById('found').innerText.includes('Found the part')");

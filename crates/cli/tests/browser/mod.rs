@@ -1,4 +1,4 @@
-//! The annotation page in headless Chromium, as used by a new user: from a photo to a taught model and back.
+//! The annotation page in headless Chromium, used as a new user would: from a photo to a taught model and back.
 //!
 //! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
 //! target/browser-test.

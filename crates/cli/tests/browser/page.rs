@@ -1,4 +1,4 @@
-//! `sdg annotate` on a folder of its own, opened in a browser.
+//! `sdg annotate` on a folder that belongs to the test, opened in a browser.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -9,11 +9,11 @@ use sdg_webdriver::{Browser, BrowserOptions};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// The pendulum's box on its photo; the middle of its handle is a good place to grasp it.
+/// The pendulum's box on its photo; the middle of its handle is a good place for the grasp.
 pub const BOX: [f64; 4] = [255.0, 164.0, 392.0, 282.0];
 pub const HOLD: [f64; 2] = [325.0, 225.0];
 
-/// The page with its server and browser; all are stopped when dropped.
+/// The page with its server and browser; both are stopped when it is dropped.
 pub struct Page {
     pub browser: Browser,
     pub folder: TempDir,
@@ -74,13 +74,13 @@ impl Page {
     }
 
     pub fn click(&self, css: &str) {
-        // Scrolled first: on a narrow screen most of the page is below the photo.
+        // Scrolled first, because most of the page is below the photo on a narrow screen.
         let script = "document.querySelector(arguments[0]).scrollIntoView({block: 'center'})";
         self.browser.run(script, &[json!(css)]).unwrap();
         self.browser.find(css).unwrap().click().unwrap();
     }
 
-    /// Opens a folded section.
+    /// Opens a collapsed section.
     pub fn unfold(&self, css: &str) {
         if self.browser.run("return document.querySelector(arguments[0]).open", &[json!(css)]).unwrap() == json!(false)
         {
@@ -88,7 +88,7 @@ impl Page {
         }
     }
 
-    /// Chooses the model to teach; all letters but C are in a folded section.
+    /// Chooses the model to teach; all letters except C are in a collapsed section.
     pub fn choose_model(&self, letter: &str) {
         if letter != "C" {
             self.unfold("#other-models");
@@ -96,8 +96,8 @@ impl Page {
         self.click(&format!("[name=model][value={letter}]"));
     }
 
-    /// Replaces the text of a field by keys alone. The page may write to a field without focus at any time, and a
-    /// hidden field takes no focus.
+    /// Replaces the text of a field with keys alone. The page may write to a field without focus at any time, and a
+    /// hidden field cannot have the focus.
     pub fn fill(&self, css: &str, text: &str) {
         let shown = format!("return document.querySelector({css:?}).checkVisibility()");
         self.wait_for("a field that is shown", &shown);
@@ -116,7 +116,7 @@ impl Page {
         numbers(&self.browser.run(script, &[json!(x), json!(y)]).unwrap())
     }
 
-    /// Middle of a handle on the screen.
+    /// The centre of a handle on the screen.
     pub fn handle(&self, css: &str) -> [f64; 2] {
         let script = "const r = document.querySelector(arguments[0]).getBoundingClientRect();
             return [r.left + r.width / 2, r.top + r.height / 2]";
@@ -143,7 +143,7 @@ impl Page {
         self.wait_for("the page to draw", script);
     }
 
-    /// Waits until everything is saved and reads the saved marks.
+    /// Waits until everything is saved, and reads the saved marks.
     pub fn saved(&self) -> Annotation {
         self.settle();
         self.wait_for(
@@ -181,7 +181,7 @@ pub fn assert_accessible(browser: &Browser, about: &str) {
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
-    // A file above the test's size limit is then an error, as on a full disk, and does not end the program.
+    // A file above the test's size limit is then an error, as on a full disk, instead of ending the program.
     let mut server = Command::new("sh")
         .args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_sdg")])
         .args(["annotate", "--no-browser", "--json"])

@@ -1,4 +1,4 @@
-//! The page's main task: mark with the mouse, view samples, teach, try, learn from a detection.
+//! The main task of the page: mark with the mouse, view samples, teach, try, and learn from a detection.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ fn from_a_photo_to_a_taught_model_and_another_demonstration() {
     assert_light(&page);
     page.assert_accessible("empty page");
     page.screenshot("1-empty");
-    // Controls that need marks are disabled and say why.
+    // Controls that need marks are disabled and give the reason.
     let off = |css: &str| {
         let script = "const b = document.querySelector(arguments[0]); return b.disabled ? b.title : 'on'";
         page.browser.run(script, &[css.into()]).unwrap()
@@ -109,7 +109,7 @@ fn mark(page: &Page) {
     browser.press(&["\u{e009}", "z"]).unwrap();
     page.wait_for("undo", "return !document.getElementById('redo').disabled");
 
-    // Dragging the end of the line by a quarter turn rotates the gripper: now it is parallel to the part.
+    // Dragging the end of the line by 90° rotates the gripper, which is then parallel to the part.
     let (end, middle) = (page.handle("[data-end='end'] .knob"), page.on_screen([line.center().x, line.center().y]));
     let around = [middle[0] - (end[1] - middle[1]), middle[1] + (end[0] - middle[0])];
     let half = [0.5 * (end[0] + around[0]), 0.5 * (end[1] + around[1])];
@@ -122,7 +122,7 @@ fn mark(page: &Page) {
     browser.press(&["\u{e009}", "z"]).unwrap();
     page.wait_for("no warning", "return document.querySelector('[data-code=gripper_along]') === null");
 
-    // A point of the outline is dragged and the page reloaded: the state is unchanged.
+    // A point of the outline is dragged and the page is reloaded; the state is unchanged.
     page.click("#do-outline h2");
     page.settle();
     page.assert_accessible("with the outline's points");
@@ -150,7 +150,7 @@ fn see_samples(page: &Page) {
 fn teach(page: &Page) {
     page.screenshot("5-teach");
     page.assert_accessible("teaching");
-    // A few steps of a network that starts from the shipped weights give a model already.
+    // A few steps of a network that starts from the shipped weights already give a model.
     page.click("[name=model][value=C]");
     page.click("#more summary");
     page.assert_accessible("all settings");
@@ -167,7 +167,7 @@ fn teach(page: &Page) {
     page.choose_model("S");
     page.click("#fixed-height");
     page.click("#teach-start");
-    // Both models are kept, and the figures are those of the finished model, also of one without a network.
+    // Both models are kept, and the figures are those of the finished model, also for a model without a network.
     let instant = "const models = [...document.querySelectorAll('#version-list li')].map((li) => li.innerText);
         return models.length === 2 && models[1].includes('2: S') && / of \\d+ found/.test(models[1])
             && models[1].includes('in use')";
@@ -192,18 +192,18 @@ pub fn patiently(page: &Page, what: &str, script: &str) -> Value {
 }
 
 fn try_on_another_picture(page: &Page) {
-    // The part is now rotated by half a turn, at another place.
+    // The part is now rotated by 180°, at another position.
     let other = page.folder.path().join("other.png");
     let turned = image::imageops::rotate180(&image::open(shipped_photo()).unwrap().into_rgb8());
     turned.save(&other).unwrap();
     let before = page.saved_grasp();
     page.click("#go-try");
-    // A file that only looks like a picture is reported with its name.
+    // A file that only has the name of a picture is reported.
     let broken = page.folder.path().join("broken.png");
     std::fs::write(&broken, "no picture").unwrap();
     page.browser.find("#picture-input").unwrap().type_text(broken.to_str().unwrap()).unwrap();
     page.wait_for("its error", "return document.getElementById('try-error').innerText.includes('broken.png')");
-    // The browser's console has the refusal too, and nothing else.
+    // The browser's console contains the refusal as well, and nothing else.
     let told = page.browser.console_errors().unwrap();
     assert!(told.len() == 1 && told[0].contains("422"), "{told:?}");
     page.screenshot("9-broken");

@@ -1,4 +1,5 @@
-//! A project: reopening it, its versions, pictures without the part, wrongly refused pictures, the server's end.
+//! A project: reopening it, its versions, pictures without the part, wrongly refused pictures, and the end of the
+//! server.
 
 use std::net::TcpListener;
 use std::path::Path;
@@ -45,7 +46,7 @@ fn try_picture(page: &Page, name: &str, picture: &RgbImage) {
     page.click("#tab-try");
     page.browser.find("#picture-input").unwrap().type_text(path.to_str().unwrap()).unwrap();
     page.wait_for(name, &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
-    // The answer for the picture before stays until the next frame.
+    // The answer for the previous picture stays until the next frame.
     page.settle_frames();
     patiently(
         page,
@@ -98,7 +99,7 @@ fn several_found_ones_have_numbers() {
     page.screenshot("project-11-two");
     page.assert_accessible("two found");
 
-    // The minimum score takes effect in the list, in the picture and in the row.
+    // The minimum score applies to the list, to the picture and to the row.
     let count = page.text("#least-score-count");
     assert!(count.starts_with("Found 2 of ") && count.contains("at 0.50, in 1 of 1 pictures"), "{count}");
     let slide =
@@ -179,7 +180,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
         "a demonstration",
         "return document.getElementById('found').innerText.includes('Now a demonstration')",
     );
-    // Model S is taught in seconds: it learns at once, and the page reports the effect, even if there is none.
+    // Model S is taught in seconds: it learns immediately, and the page reports the effect, even if there is none.
     let told = "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
     patiently(&page, "the change", told);
     page.settle_frames();
@@ -219,7 +220,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     let taught = "return document.querySelectorAll('#version-list li').length === 3
         && document.getElementById('teach-old').hidden && !document.getElementById('go-try').hidden";
     patiently(&page, "another version", taught);
-    // Another symmetry makes the result old, until the earlier one is chosen again.
+    // With another symmetry the result is outdated, until the earlier symmetry is chosen again.
     page.click("#tab-teach");
     for (turns, is_old) in [("2", true), ("1", false)] {
         let choose = format!("document.querySelector('[name=symmetry][value=\"{turns}\"]').click()");
@@ -249,7 +250,8 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     teach_s(&page, 2);
     assert!(page.text("#version-list").contains("1 without the part"), "{}", page.text("#version-list"));
 
-    // Closed and reopened: everything is there. The page is closed first, or it would call the server in between.
+    // After closing and reopening, everything is still there. The page is closed first; otherwise it would call the
+    // server in between.
     page.browser.open("about:blank").unwrap();
     page.stop_server();
     page.start_server();
@@ -267,7 +269,7 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     let compared = "const text = document.getElementById('compared').innerText;
         return text.includes('other.png') && text.includes('empty.png') && text";
     patiently(&page, "the table", compared);
-    // Each checkbox is beside its label, and the button is in the card; "in use" is no warning.
+    // Each checkbox is beside its label, the button is inside the card, and "in use" does not look like a warning.
     let layout = "const cards = [...document.querySelectorAll('#version-list li')];
         const middle = (r) => (r.top + r.bottom) / 2, rect = (e) => e.getBoundingClientRect();
         const word = (label) => { const range = document.createRange(); range.selectNode(label.lastChild); return rect(range); };
@@ -355,7 +357,7 @@ fn on_a_full_disk_a_banner_stays_and_saving_is_tried_again() {
     page.wait_for("the banner", "return !document.getElementById('unsaved').hidden");
     let banner = page.text("#unsaved");
     assert!(banner.starts_with("Not saved: the marks on photo.png (") && banner.contains("too large"), "{banner}");
-    // The message remains, elsewhere on the page and later.
+    // The message stays, also elsewhere on the page and later.
     page.click("#tab-try");
     page.settle_frames();
     page.wait_for("another try", "return new Promise((done) => setTimeout(() => done(true), 3500))");
@@ -378,7 +380,7 @@ fn a_click_corrects_the_outline_and_is_undone() {
     page.settle();
     let area = |page: &Page| page.saved().outline.unwrap().area();
     let before = area(&page);
-    // A corner of the box that contains only table is marked as part.
+    // A corner of the box that contains only table is marked as part of the object.
     page.click("[data-tool=in]");
     page.browser.drag(&[page.on_screen([270.0, 265.0])]).unwrap();
     page.settle();
@@ -420,7 +422,7 @@ fn that_an_outline_has_no_holes_is_said() {
     assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");
     page.screenshot("project-10-hole");
     page.assert_accessible("a click in a hole");
-    // For a round outline the page asks whether the part looks the same when turned.
+    // For a round outline, the page asks whether the part looks the same when rotated.
     page.click("#tab-teach");
     page.wait_for("the question", "return document.getElementById('symmetry').open");
     assert!(page.text("#symmetry-why").contains("Any turn"), "{}", page.text("#symmetry-why"));

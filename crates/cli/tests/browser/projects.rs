@@ -1,4 +1,4 @@
-//! The page's project: a photo's own, a chosen one, or a new folder for a photo.
+//! The project of the page: a photo's own project, a chosen one, or a new folder for a photo.
 
 use serde_json::json;
 
@@ -64,7 +64,7 @@ fn without_an_argument_a_photo_becomes_a_project_that_is_found_again() {
     let listed = page.text("#recent-list");
     assert!(listed.starts_with("hanging pendulum") && listed.contains("/hanging_pendulum"), "{listed}");
     theme(&page, "recent");
-    // A name that exists already is reported, and no file is overwritten.
+    // A name that already exists is reported, and no file is overwritten.
     page.browser.find("#new-input").unwrap().type_text(shipped_photo().to_str().unwrap()).unwrap();
     page.wait_for("the form", "return !document.getElementById('new-part').hidden");
     page.fill("#new-name", "hanging pendulum");
@@ -137,7 +137,7 @@ fn in_a_new_folder_the_photo_is_chosen_and_the_name_is_asked_for_once() {
     open_folder(&page, "#choose-photo");
     page.click("#folder-list li:nth-child(2) button");
     photo_of_page(&page, "IMG_2.png");
-    // The folder's name is proposed, since cameras' names say nothing.
+    // The folder's name is proposed, because file names of cameras carry no meaning.
     assert_eq!(page.browser.run("return document.getElementById('label').value", &[]).unwrap(), json!("lever"));
     assert!(page.text("#naming").contains("is a proposal"));
     theme(&page, "named");

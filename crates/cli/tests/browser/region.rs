@@ -1,11 +1,11 @@
-//! The searched region: drawn on a picture, given as numbers, on live pictures, and in the next taught model.
+//! The searched region: drawn on a picture, given as numbers, on live pictures, and in the next model.
 
 use serde_json::json;
 
 use super::page::{HOLD, Page, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// A region around the pendulum, and one beside it.
+/// A region around the pendulum, and a region beside it.
 const ON_IT: [f64; 4] = [220.0, 140.0, 200.0, 200.0];
 const BESIDE_IT: [f64; 4] = [20.0, 20.0, 180.0, 160.0];
 
@@ -95,7 +95,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.screenshot("region-2-typed");
     page.assert_accessible("a region by numbers");
 
-    // A region too small for the part is rejected with a message, and the old one is kept.
+    // A region that is too small for the part is rejected with a message, and the previous one is kept.
     drag(&page, [HOLD[0] - 20.0, HOLD[1] - 20.0, 40.0, 40.0]);
     page.wait_for(
         "the refusal",

@@ -1,4 +1,5 @@
-//! Tried pictures: jaws that touch a neighbour, the refused picture that helps most, two hundred pictures at once.
+//! Tried pictures: jaws that touch a neighbour, the refused picture that helps most, and two hundred pictures in one
+//! action.
 
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};

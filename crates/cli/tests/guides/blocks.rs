@@ -3,7 +3,7 @@
 /// A fenced block.
 #[derive(Debug)]
 pub struct Block {
-    /// The line of its fence, from 1.
+    /// The line of the fence, from 1.
     pub line: usize,
     /// The language after the fence: `text`, `yaml`, or none for commands.
     pub language: String,
@@ -12,22 +12,22 @@ pub struct Block {
     pub text: String,
 }
 
-/// Why a block is not run with the others.
+/// The reason why a block is not run with the others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Marker {
-    /// Hardware, a network, root, a browser: it is never run.
+    /// Hardware, a network, root or a browser is needed: the block is never run.
     Needs(String),
-    /// It is run by `make test-guides` alone.
+    /// The block takes long: it is run only by `make test-guides`.
     Takes(String),
 }
 
 impl Block {
-    /// Whether it holds commands of a shell.
+    /// Whether the block contains shell commands.
     pub fn is_shell(&self) -> bool {
         ["", "sh", "console"].contains(&self.language.as_str())
     }
 
-    /// Its commands without prompts.
+    /// The commands without prompts.
     pub fn script(&self) -> String {
         self.text.lines().map(|line| line.strip_prefix("$ ").unwrap_or(line)).collect::<Vec<_>>().join("\n")
     }
@@ -76,12 +76,12 @@ pub fn spans(document: &str) -> Vec<String> {
             text.push('\n');
         }
     }
-    // Spans in double backticks hold single ones.
+    // Spans in double backticks contain single ones.
     let text = text.replace("``", "");
     text.split('`').skip(1).step_by(2).map(|span| span.replace("\\|", "|").replace('\n', " ")).collect()
 }
 
-/// The words behind the program's name of each call of `sdg` in a text of commands, without comments.
+/// The words after the program's name for each call of `sdg` in a text of commands, without comments.
 pub fn calls(commands: &str) -> Vec<Vec<String>> {
     let joined = commands.replace("\\\n", " ");
     let mut calls = Vec::new();

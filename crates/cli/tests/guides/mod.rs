@@ -13,7 +13,7 @@ use clap::Command;
 
 use blocks::{blocks, calls, spans};
 
-/// Options of other programs that documents name.
+/// Options of other programs that documents mention.
 const OTHERS: &[&str] = &[
     // cargo and its tests
     "--release",
@@ -43,7 +43,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
-/// The documents that a user reads: decisions and results tell of the past, and the page's style has variables that look like options.
+/// The documents that a user reads, without decisions and results, which describe the past, and without the page's
+/// style, whose variables look like options.
 fn documents() -> Vec<(String, String)> {
     let listed = Process::new("git")
         .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", "*.md"])
@@ -72,7 +73,7 @@ fn fault(root: &Command, words: &[String]) -> Option<String> {
             // VERB, …, or an option of the program itself.
             return None;
         }
-        // `camera list|grab|watch` names several.
+        // `camera list|grab|watch` names several verbs.
         let alternatives: Vec<&str> = verb.split('|').collect();
         for alternative in &alternatives {
             if command.find_subcommand(alternative).is_none() {
@@ -139,7 +140,7 @@ fn calls_in_documents_name_verbs_and_options_that_there_are() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// All texts of the sources, with the line breaks of string literals taken out.
+/// All texts of the sources, with the line breaks inside string literals removed.
 fn sources() -> String {
     fn collect(folder: &Path, texts: &mut String) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -148,7 +149,7 @@ fn sources() -> String {
                 collect(&path, texts);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
                 let text = fs::read_to_string(&path).unwrap();
-                // Tests quote messages; they do not make them.
+                // Tests quote messages but do not create them.
                 *texts += text.split("#[cfg(test)]").next().unwrap();
             }
         }

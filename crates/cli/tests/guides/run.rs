@@ -1,7 +1,8 @@
-//! The commands of the guides, run one document after the other in a folder with a photo, pictures, a model and the files of a workcell.
+//! The commands of the guides, run one document after another in a folder with a photo, pictures, a model and the files
+//! of a workcell.
 //!
-//! A block that needs what not every computer has says so in a comment above it (`<!-- needs: a camera -->`) and is not run; one that
-//! takes long (`<!-- takes: half a minute -->`) is run by `make test-guides`.
+//! A block with requirements that not every computer meets states them in a comment above it (`<!-- needs: a camera
+//! -->`) and is not run. A block that takes long (`<!-- takes: half a minute -->`) is run by `make test-guides`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,7 +13,7 @@ use super::blocks::{Marker, blocks};
 use super::root;
 use crate::support::{Folder, shipped, taught_pendulum};
 
-/// The documents whose commands run. Another one with commands fails [`every_guide_with_commands_is_run`].
+/// The documents whose commands are run. Any other document with commands fails [`every_guide_with_commands_is_run`].
 const GUIDES: &[&str] = &[
     "README.md",
     "docs/c.md",
@@ -33,7 +34,8 @@ const GUIDES: &[&str] = &[
     "docs/weights.md",
 ];
 
-/// A folder as the guides take it for granted: of the shipped pendulum, whose photo, pictures and model have the guides' names.
+/// A folder with the contents that the guides assume: the shipped pendulum's photo, pictures and model, with the names
+/// that the guides use.
 fn folder_of_a_reader() -> Folder {
     let folder = Folder::new();
     let link = |to: &Path, name: &str| std::os::unix::fs::symlink(to, folder.path(name)).unwrap();
@@ -43,7 +45,7 @@ fn folder_of_a_reader() -> Folder {
     let program = Path::new(env!("CARGO_BIN_EXE_sdg"));
     link(program, "bin/sdg");
     link(program, "target/release/sdg");
-    // Copies: a guide that wrote into the repository would change it.
+    // Copies, because a guide that writes into the repository would change it.
     let copied = |from: &Path, to: &str| {
         fs::create_dir_all(Path::new(&folder.path(to)).parent().unwrap()).unwrap();
         fs::copy(from, folder.path(to)).unwrap();
@@ -63,7 +65,7 @@ fn folder_of_a_reader() -> Folder {
     copied(&shipped("pendulum", "image.png"), "photo.png");
     copied(&shipped("pendulum", "annotation.json"), "photo.json");
     taught_pendulum(folder.path("part.sdg"), Some(&root().join("datasets/workcell/camera.yaml")));
-    // The photo is a picture of the camera that the model was taught with, in which the part lies on the table.
+    // The photo is a picture of the camera with which the model was taught, and shows the part on the table.
     for name in ["table.png", "more-pictures/1.png", "pictures/1.png"] {
         copied(&shipped("pendulum", "image.png"), name);
     }
@@ -71,7 +73,7 @@ fn folder_of_a_reader() -> Folder {
     folder
 }
 
-/// Runs the commands of a guide; those that take long with `all` alone. Gives how many blocks ran.
+/// Runs the commands of a guide; those that take long only with `all`. Returns the number of blocks that ran.
 fn run(guide: &str, all: bool) -> usize {
     let document = fs::read_to_string(root().join(guide)).unwrap();
     let mut folder = None;

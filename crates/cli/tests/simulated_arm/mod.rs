@@ -15,7 +15,7 @@ pub struct Simulated {
 
 impl Simulated {
     pub fn start(further: &[&str]) -> Self {
-        // Two free neighbouring ports that no other test of this process is about to use.
+        // Two free neighbouring ports that no other test of this process will use.
         let begin = 20_000 + std::process::id() as u16 % 20_000 + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 50;
         let port = (begin..60_000)
             .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))

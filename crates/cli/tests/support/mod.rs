@@ -1,4 +1,5 @@
-//! Shared code of the command line's tests: running `sdg`, the shipped demonstrations, a temporary folder.
+//! Code that the tests of the command line have in common: running `sdg`, the shipped demonstrations, a temporary
+//! folder.
 #![allow(missing_docs)]
 
 mod documented;
@@ -32,11 +33,11 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations").join(part).join(name)
 }
 
-/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, marks at 16 mm and grasp at 9 mm, or
-/// without.
+/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, marks at 16 mm and grasp at 9 mm; or
+/// without a camera.
 ///
-/// Thirty tests need one of the two models, each in its own process, and a teaching takes five seconds of a core. So
-/// the first test that needs a model teaches it, for this program and these inputs, and the others copy the file.
+/// Thirty tests need one of the two models, each in its own process, and a teaching takes five seconds on one core. The
+/// first test that needs a model therefore teaches it, for this program and these inputs, and the others copy the file.
 pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
     fs::create_dir_all(&folder).unwrap();
@@ -52,7 +53,7 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     camera_file.hash(&mut hasher);
     let model = folder.join(format!("pendulum-{:016x}.sdg", hasher.finish()));
 
-    // The inputs of the model are written into the locked file once the model is complete.
+    // The inputs of the model are written into the locked file after the model is complete.
     let mut lock =
         File::options().read(true).write(true).create(true).truncate(false).open(model.with_extension("lock")).unwrap();
     lock.lock().unwrap();

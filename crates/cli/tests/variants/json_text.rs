@@ -5,7 +5,7 @@ use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use serde_json::Value;
 
-/// The file's bytes, and a description of the style.
+/// The bytes of the file, and a description of the style.
 pub fn written(dice: &mut Pcg64Mcg, value: &Value) -> (Vec<u8>, String) {
     let [is_shuffled, is_indented, is_ascii, has_mark, has_crlf] =
         [0.6, 0.5, 0.4, 0.3, 0.3].map(|p| dice.random_bool(p));

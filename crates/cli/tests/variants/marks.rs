@@ -1,4 +1,4 @@
-//! Ways to store the marks of a scene without losing any part of the grasp.
+//! Ways to store the marks of a scene without loss.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -110,7 +110,7 @@ pub fn labelme(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     file
 }
 
-/// COCO with ids of any kind, keypoints in the order of the category's names, and other images and annotations.
+/// COCO with ids of any kind, keypoints in the order of the category's names, and further images and annotations.
 pub fn coco(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Value, String) {
     let as_id = |dice: &mut Pcg64Mcg, id: u32| match dice.random_range(0..3) {
         0 => json!(id),

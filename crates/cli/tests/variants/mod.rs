@@ -6,7 +6,7 @@
 //!        ├─ marks: format, order, ids, units, paths, names ─ convert to COCO ──┼─ the same grasp, or a refusal
 //!        └─ a sample of both ─────────────────────────────── teach, detect ────┘
 //! ```
-//! A variant is determined by the seed and its number, so that a failure can be reproduced: `SDG_VARIANTS_SEED=7 cargo
+//! The seed and the number of a variant determine it, so that a failure can be reproduced: `SDG_VARIANTS_SEED=7 cargo
 //! nextest run …`.
 
 mod json_text;
@@ -39,7 +39,7 @@ use crate::support::{Folder, stdout};
 const NUM_VARIANTS: usize = 300;
 /// Minimum number of lossless variants; all of them must give the grasp.
 const MIN_LOSSLESS: usize = 200;
-/// Every variant whose number is a multiple of this is also taught from.
+/// Models are also taught from variants whose number is a multiple of this.
 const TAUGHT_EACH: usize = 19;
 const DEFAULT_SEED: u64 = 1;
 const SEED_VARIABLE: &str = "SDG_VARIANTS_SEED";
@@ -87,7 +87,7 @@ struct Variant {
     kind: Kind,
     photo: Photo,
     marks: Marks,
-    /// A refusal contains one of these words; empty if a refusal is not allowed.
+    /// Words of which a refusal must contain one; empty if a refusal is not allowed.
     refusal_words: &'static [&'static str],
     is_relative: bool,
     is_taught: bool,
@@ -173,7 +173,7 @@ impl Variant {
     }
 }
 
-/// A model of the scene, with which all variants of the picture are searched.
+/// A model of the scene that searches all variants of the picture.
 fn taught(folder: &Folder) -> String {
     scene().photo.save(folder.path("scene.png")).unwrap();
     let mut dice: Pcg64Mcg = generator_at(0, 1, 0);

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::scene::Scene;
 
-/// Grasps are the same up to this distance and this turn.
+/// Maximum distance and angle between equal grasps.
 const SAME_PX: f64 = 0.5;
 const SAME_DEG: f64 = 0.5;
 
@@ -15,12 +15,12 @@ pub enum Outcome {
     Same,
     /// One line that names file and field.
     Refused,
-    /// Anything else, in words.
+    /// Any other outcome, in words.
     Other(String),
 }
 
 impl Outcome {
-    /// Turns an outcome that this variant must not have into a failure.
+    /// Converts an outcome that is wrong for this variant to a failure.
     pub fn into_failure(self, what: &str) -> Self {
         match self {
             Self::Other(why) => Self::Other(why),
@@ -49,7 +49,7 @@ pub fn of_detection(done: &Output, scene: &Scene) -> Option<Outcome> {
     })
 }
 
-/// The marks in a COCO file of the program; boxes and outlines are compared if present.
+/// The marks in a COCO file of the program. Boxes and outlines are compared if there are any.
 pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
     let file: Value = serde_json::from_slice(coco).unwrap();
     let annotations = file["annotations"].as_array().unwrap();
@@ -85,7 +85,7 @@ pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
 
 /// Whether a call without a grasp reports it in one line with one of these file names and one of these words.
 pub fn of_refusal(done: &Output, file_names: &[&String], words: &[&str]) -> Outcome {
-    /// It ran, but found nothing to grasp: a result, printed on standard output.
+    /// The exit code for nothing to grasp, which is a result on standard output.
     const NOTHING_TO_GRASP: i32 = 3;
     let told = if done.status.code() == Some(NOTHING_TO_GRASP) { &done.stdout } else { &done.stderr };
     let told = String::from_utf8_lossy(told);

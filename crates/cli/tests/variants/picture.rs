@@ -1,4 +1,4 @@
-//! Ways to store one picture: lossless, lossy, damaged.
+//! Ways to store a picture: lossless, lossy, damaged.
 
 use std::io::Cursor;
 
@@ -21,7 +21,7 @@ pub struct Photo {
     pub recipe: String,
 }
 
-/// File names of people and systems; one of them has an extension that contradicts the content.
+/// File names of people and systems; the extension of one of them contradicts the content.
 const STEMS: [&str; 12] = [
     "photo",
     "Schlüssel groß",
@@ -82,7 +82,7 @@ fn png(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let stored = stored_for(photo, orientation.unwrap_or(1)).to_rgb8();
     let (num_channels, bit_depth) = *pick(dice, &[(1, 8), (3, 8), (4, 8), (3, 16), (4, 16)]);
     let bytes_per_sample = usize::from(bit_depth) / 8;
-    // An alpha of 0 or 1 everywhere was never set.
+    // An alpha channel of 0 or of 1 everywhere was never set.
     let alpha = if bit_depth == 8 { *pick(dice, &[255, 0, 1]) } else { 255 };
     let is_palette = num_channels == 1;
     let file = Png {
@@ -177,7 +177,7 @@ fn bmp(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let kind = *pick(dice, &["24 bits", "24 bits from the top", "32 bits", "32 bits, alpha 0"]);
     let mut bytes = match kind {
         "24 bits" => encoded(&photo.clone().into(), ImageFormat::Bmp),
-        // Then the height is negative, and the rows are stored top down.
+        // The height is then negative, and the rows are stored from the top.
         "24 bits from the top" => encoded(&DynamicImage::from(photo.clone()).flipv(), ImageFormat::Bmp),
         "32 bits" => encoded(&with_alpha(photo, 255).into(), ImageFormat::Bmp),
         _ => encoded(&with_alpha(photo, 0).into(), ImageFormat::Bmp),
@@ -202,7 +202,7 @@ fn ppm(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     named(dice, &["ppm", "PPM"], format!("PPM {head:?}"), [head.as_bytes(), photo.as_raw()].concat())
 }
 
-/// The picture with changed pixels, damaged, or not a picture; and the words that a refusal may contain.
+/// The picture with changed pixels, damaged, or not a picture; and the words of which a refusal may contain one.
 pub fn spoilt(dice: &mut Pcg64Mcg, photo: &RgbImage) -> (Photo, &'static [&'static str]) {
     let whole = DynamicImage::from(photo.clone());
     let jpeg = |quality: u8| {

@@ -29,7 +29,7 @@ pub struct Tiff {
     pub palette: Option<Vec<u16>>,
     pub is_float: bool,
     pub orientation: Option<u8>,
-    /// Number of pages before it, each of 8×6 pixels: thumbnails, or independent pictures.
+    /// Number of pages before this one, each of 8×6 pixels: thumbnails or independent pictures.
     pub thumbnails: usize,
     pub other_pages: usize,
 }
@@ -152,7 +152,7 @@ impl Tiff {
     }
 }
 
-/// Valid data of each compression; none becomes smaller.
+/// Valid data for each compression; no result is smaller.
 fn compressed(bytes: &[u8], compression: Compression) -> Vec<u8> {
     match compression {
         Compression::None => bytes.to_vec(),
@@ -162,7 +162,7 @@ fn compressed(bytes: &[u8], compression: Compression) -> Vec<u8> {
     }
 }
 
-/// Codes of nine bits; the table is cleared before codes become longer.
+/// Codes of nine bits; the table is cleared before codes would become longer.
 fn lzw(bytes: &[u8]) -> Vec<u8> {
     const CLEAR: u16 = 256;
     const END: u16 = 257;

@@ -1,4 +1,4 @@
-//! Marks with a fault, each with the words of which a refusal must contain one.
+//! Faulty marks, each with words of which the error must contain one.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -68,7 +68,7 @@ fn in_other_units(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wo
         4 => [100.0 * x / width, 100.0 * y / height],
         _ => [x, y],
     };
-    // For a rotated photo, the marks may fit its stored pixels better than either.
+    // For a rotated photo, the marks may fit its stored pixels better than either reading.
     let (recipe, words): (&str, Words) = match kind {
         0 => ("shares", &["shares"]),
         1 => ("half scale, size unknown", &["half scale", "Exif"]),
@@ -149,7 +149,7 @@ fn contradictory(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wor
         6 => {
             let keypoints = annotation["keypoints"].as_array().unwrap();
             set(&mut file, "keypoints", json!(keypoints[3..]));
-            ("a keypoint too few", &["keypoints"])
+            ("one keypoint too few", &["keypoints"])
         }
         7 => {
             let names = file["categories"][0]["keypoints"].as_array().unwrap();
@@ -166,12 +166,12 @@ fn contradictory(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wor
             ("images of other names", &["images: one.png"])
         }
         _ => {
-            // The photo beside it shows the part there.
+            // The photo beside the file shows the part at these marks.
             file = sizeless(coco(dice, super::other_scene(), super::OTHER_PHOTO).0);
             file["images"] = json!([{"id": file["images"][0]["id"], "file_name": super::OTHER_PHOTO}]);
             file["annotations"].as_array_mut().unwrap().retain(|one| one.get("area").is_some());
             file["annotations"][0]["image_id"] = file["images"][0]["id"].clone();
-            ("marks of another photo, which is there", &["file_name", "another photo"])
+            ("marks of another existing photo", &["file_name", "another photo"])
         }
     };
     (in_json(dice, &file, recipe), words)
@@ -186,7 +186,7 @@ fn unreadable(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Words)
     let (recipe, marks, words): (&str, Marks, Words) = match dice.random_range(0..16) {
         0 => {
             let end = (whole.bytes.len() as f64 * dice.random_range(0.1..0.95)) as usize;
-            ("JSON that breaks off", Marks { bytes: whole.bytes[..end].to_vec(), ..whole }, &["line", "UTF-8"])
+            ("truncated JSON", Marks { bytes: whole.bytes[..end].to_vec(), ..whole }, &["line", "UTF-8"])
         }
         1 => {
             let units = value.to_string().encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>();

@@ -1,8 +1,8 @@
-//! A folder of labelled pictures: the assignment of label files to pictures, and their contents.
+//! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture. A label file with a picture's name belongs to that picture, whatever name it contains
-//! (files get renamed); any other one belongs to the pictures that it names.
+//! COCO beside the picture. A label file with a picture's name belongs to that picture even if it contains another
+//! name, because people rename files. Every other label file belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::error::EvaluationError;
 
-/// Maximum distance, in lengths of the mark, between a mark and the place of the demonstration's cut-out for which both
-/// are the same.
+/// Maximum distance between a mark and the position of the demonstration's cut-out for both to be the same instance, in
+/// lengths of the mark.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
 /// The pictures for testing a model.
@@ -31,20 +31,20 @@ pub struct LabelledFolder {
     pub pictures: Vec<LabelledPicture>,
     /// Other files of the folder.
     pub left_out: Vec<LeftOut>,
-    /// Number of instances with other labels, which are not the part.
+    /// Number of instances with labels of other objects.
     pub others: usize,
 }
 
 impl LabelledFolder {
-    /// Reads every label and checks it against its picture, before any time is spent on detection.
+    /// Reads every label and checks it against its picture, before the detection, which takes long.
     ///
-    /// If there are labels of several names, those of `label` count; without it, those of the model's object. If there
-    /// is a `truth.json`, no other label is read.
+    /// If the labels have several names, the instances with `label` count, or without it those with the model's object.
+    /// If there is a `truth.json`, no other label is read.
     ///
     /// # Errors
-    /// A folder without pictures or labels, a damaged label file, a label file that names a missing picture, marks
-    /// outside the picture or for another picture size, two files that label one picture, an instance without a grasp
-    /// that is not optional, or several labels none of which is selected.
+    /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the
+    /// picture or for another picture size; two files label the same picture; an instance that is not optional has no
+    /// grasp; there are several labels, none of which is selected.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let mut others = 0;
@@ -101,7 +101,8 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         let known = IMAGE_EXTENSIONS.join(", ");
         bail!("{}: expected pictures ({known}), found none among {} files", folder.display(), paths.len());
     }
-    // Photos from a phone in an unsupported format are listed here, so that the user does not miss them in the result.
+    // Photos in unsupported formats, such as those of phones, are listed, so that the user learns that they were not
+    // tested.
     for path in paths.iter().filter(|path| sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
         let why = sdg_inputs::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
         left_out.push(LeftOut { file: file_name(path), why });
@@ -112,7 +113,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
             pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
         let bytes = sdg_files::read(path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
         let file = match LabelFile::parse(&bytes) {
-            // Other programs store JSON beside pictures too.
+            // Other programs store JSON beside pictures as well.
             Err(Error::WrongFile { .. }) if same_name.is_empty() => {
                 let why = "neither LabelMe nor COCO JSON, and no picture has its name".to_owned();
                 left_out.push(LeftOut { file: file_name(path), why });
@@ -143,12 +144,12 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         );
     }
     for picture in pictures.iter().filter(|picture| !assigned.pictures.contains_key(picture.as_path())) {
-        left_out.push(LeftOut { file: file_name(picture), why: "no label file speaks of it".to_owned() });
+        left_out.push(LeftOut { file: file_name(picture), why: "no label file names it".to_owned() });
     }
     Ok(assigned)
 }
 
-/// The pictures that a label file refers to.
+/// The pictures that a label file labels.
 fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &Path) -> Result<Vec<PathBuf>> {
     let names = file.picture_names().with_context(|| path.display().to_string())?;
     let is_of_one_picture = file.format() == AnnotationFormat::LabelMe || names.len() == 1;
@@ -175,13 +176,13 @@ fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &P
     names.iter().map(picture).collect()
 }
 
-/// A picture with all labelled instances, of any label.
+/// A picture with all labelled instances, whatever their labels.
 struct ReadPicture {
     path: PathBuf,
     labels: PathBuf,
     size: [u32; 2],
     instances: Vec<LabelledInstance>,
-    /// Positions from which the model's own demonstrations were cut.
+    /// Positions at which the model's own demonstrations were cut out.
     taught: Vec<Point2<f64>>,
 }
 
@@ -203,7 +204,7 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Percept
 }
 
 impl ReadPicture {
-    /// The picture with the instances that count, and the positions of demonstrations.
+    /// The picture with the instances that count, and the positions of demonstrations in it.
     fn counted(self, label: Option<&str>) -> Result<(LabelledPicture, Vec<Point2<f64>>)> {
         let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
         let instances = counted.map(|instance| {
@@ -222,7 +223,7 @@ impl ReadPicture {
     }
 }
 
-/// Instances that the model was taught from are no test, so they are optional.
+/// Makes the instances optional that the model was taught from, because they are no test.
 fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
     for instance in instances {
         instance.optional |= instance.grasp.is_some_and(|grasp| {
@@ -236,7 +237,7 @@ fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
     label.is_none_or(|label| instance.annotation.label == label)
 }
 
-/// The label that counts; `None` if all instances have the same label, whatever the name of the model's object.
+/// The label that counts; `None` if all instances have the same label, which need not be the model's object.
 fn chosen_label(
     folder: &Path,
     pictures: &[ReadPicture],

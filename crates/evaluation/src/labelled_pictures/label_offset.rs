@@ -1,9 +1,9 @@
-//! Detects labels that mark another grasp on the same part: every detection then has the same pose relative to its
-//! label.
+//! Detects labels that mark another grasp on the same part: all detections then have the same pose relative to their
+//! labels.
 //!
 //! ```text
-//! detections that hit nothing ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and turn
-//!                                                                        └─ most of them alike? ─ LabelOffset
+//! detections without a hit ─ the nearest label that was not found ─ offset in the label's frame, in diagonals, and angle
+//!                                                                        └─ most of them equal? ─ LabelOffset
 //! ```
 
 use nalgebra::{Rotation2, Vector2};
@@ -13,33 +13,33 @@ use serde::Serialize;
 use super::score::{MAX_ANGLE_DEG, MAX_DISTANCE_DIAGONALS, Tested, Totals, TrueGrasp, judge};
 use crate::statistics::Share;
 
-/// Maximum distance, in diagonals, between a label and a detection of the same part.
+/// Maximum distance between a label and a detection of the same part, in diagonals.
 const MAX_OFFSET_DIAGONALS: f64 = 0.75;
 /// Minimum number of agreeing detections.
 const MIN_AGREEING: usize = 3;
-/// Minimum share of agreeing detections among those that hit nothing.
+/// Minimum fraction of agreeing detections among all that hit no instance.
 const MIN_AGREEING_SHARE: f64 = 0.6;
 
 /// The common pose of detections relative to their labels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LabelOffset {
-    /// Detections with this offset, among those that hit nothing near a label that was not found.
+    /// Number of detections with this offset, among all that hit no instance but are near a label that was not found.
     pub agreeing: Share,
     /// Mean offset along and across the label's direction, in percent of the part's diagonal.
     pub along_percent: f64,
     pub across_percent: f64,
     /// Length of the mean offset in pixels.
     pub px: f64,
-    /// Turn from the label's direction to the detection's, in (-180, 180].
+    /// Angle from the label's direction to the detection's, in (-180, 180].
     pub turn_deg: f64,
-    /// The counts with labels shifted by this offset.
+    /// The totals with labels shifted by this offset.
     pub totals: Totals,
 }
 
 /// A detection relative to a label.
 #[derive(Debug, Clone, Copy)]
 struct Beside {
-    /// In the label's frame, in diagonals.
+    /// Offset in the label's frame, in diagonals.
     offset: Vector2<f64>,
     turn: Angle,
     px: f64,
@@ -47,7 +47,8 @@ struct Beside {
 }
 
 impl Beside {
-    /// The same relative to an equivalent turn of the label: the one for which the offset is nearest to `other`.
+    /// The same detection relative to an equivalent direction of the label: the one for which the offset is nearest to
+    /// `other`.
     fn turned_to(&self, other: &Self) -> Self {
         let count = match self.symmetry {
             RotationalSymmetry::Fold(count) => count,
@@ -69,7 +70,7 @@ impl Beside {
     }
 }
 
-/// The offset between labels and detections, if most detections that hit nothing have the same one.
+/// The offset between labels and detections, if most detections that hit no instance have the same one.
 pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     let beside: Vec<Beside> = tested.iter().flat_map(|tested| beside_labels(tested, min_score)).collect();
     let agreeing = |seed: &Beside| {
@@ -97,7 +98,8 @@ pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     })
 }
 
-/// Each detection that hits nothing, relative to the nearest label that was not found; one to one, best score first.
+/// Each detection that hits no instance, relative to the nearest label that was not found. They are assigned one to
+/// one, in order of decreasing score.
 fn beside_labels(tested: &Tested, min_score: f64) -> Vec<Beside> {
     let judged = judge(tested, min_score);
     let mut free: Vec<&TrueGrasp> = tested
@@ -135,13 +137,12 @@ fn moved(tested: &Tested, offset: Vector2<f64>, turn: Angle) -> Tested {
 }
 
 impl LabelOffset {
-    /// A sentence for the user.
+    /// The offset as a sentence for the user.
     pub fn in_words(&self) -> String {
         let Self { agreeing, along_percent, across_percent, px, turn_deg, totals } = self;
         format!(
-            "the labels mark another grasp than the model was taught: {} detections that hit nothing lie the same way beside their \
-             labels, {px:.1} px away ({along_percent:.0} % of the diagonal along the label, {across_percent:.0} % across), turned by \
-             {turn_deg:.0}°; with labels moved so {} parts are found, {} detections are wrong",
+            "the labels mark a different grasp from the taught one: {} detections that hit no instance have the same \
+             offset from their labels, {px:.1} px ({along_percent:.0} % of the diagonal along the label, {across_percent:.0} % across) and {turn_deg:.0}°; with the labels moved by this offset, {} parts are found and {} detections are wrong",
             agreeing, totals.found, totals.wrong
         )
     }
@@ -157,7 +158,7 @@ mod tests {
     use super::super::score::Truth;
     use super::*;
 
-    /// A part with a diagonal of 100 pixels, labelled in its middle at an angle, with a detection at an offset in the
+    /// A part with a diagonal of 100 pixels, labelled in its centre at an angle, and a detection at an offset in the
     /// label's frame.
     fn tested(symmetry: RotationalSymmetry, degrees: f64, along: f64, across: f64, turn: f64) -> Tested {
         let (angle, center) = (Angle::from_degrees(degrees), Point2::new(300.0, 200.0));

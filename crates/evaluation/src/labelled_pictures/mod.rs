@@ -1,4 +1,4 @@
-//! A taught model on the user's own labelled pictures: found, missed, wrong, false alarms and errors.
+//! Tests a taught model on the user's own labelled pictures: found, missed, wrong, false alarms and errors.
 //!
 //! ```text
 //! DIR ─ LabelledFolder: pictures, their instances, what is left out ─┐
@@ -7,9 +7,9 @@
 //!                                                                        └──────────── page, JSON ─────┘
 //! ```
 //!
-//! A **part** is an instance that must be found; an **optional** instance (mostly covered, or seen from another side)
-//! counts neither as missed nor, when hit, as wrong. A **hit** is a detection within 4 % of the instance's diagonal and
-//! 10° of its marks, one detection per instance. Pictures that the model was taught from are left out.
+//! A **part** is an instance that must be found. An **optional** instance (mostly covered, or seen from another side)
+//! counts neither as missed nor, if hit, as wrong. A **hit** is a detection within 4 % of the instance's diagonal and
+//! 10° of its marks; an instance has at most one hit. Pictures that the model was taught from are left out.
 
 mod folder;
 mod label_offset;

@@ -1,4 +1,4 @@
-//! The page of the evaluation: totals, the choice of the minimum score, and every picture with its marks and
+//! The page of the evaluation: totals, the effect of the minimum score, and every picture with its marks and
 //! detections, worst first.
 
 use anyhow::Result;
@@ -18,15 +18,15 @@ use crate::footer::FOOTER;
 use crate::machine::machine;
 use crate::statistics::{Share, wilson_interval};
 
-/// Maximum number of pictures drawn on the page; of more, the worst.
+/// Maximum number of pictures drawn on the page, the worst ones.
 const MAX_DRAWN: usize = 200;
-/// Height of a tag's capitals, in line widths: small, since a picture may have many tags.
+/// Height of a tag's capitals in line widths; small, because a picture may have many tags.
 const TAG_WIDTHS: f64 = 3.4;
 
-/// The page. Pictures are read again from their files.
+/// Makes the page. Pictures are read again from their files.
 ///
 /// # Errors
-/// A picture no longer exists.
+/// A picture is no longer there.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -53,24 +53,25 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     report = report
         .section(at_a_glance(&totals, label_offset(&evaluated.tested, evaluated.min_score).as_ref()))
         .section(
-            Section::new("The least score")
-                .lead("The same detections, counted with other limits.")
+            Section::new("The minimum score")
+                .lead("The same detections, counted at other minimum scores.")
                 .charts(vec![min_score_chart(evaluated)]),
         )
         .section(Section::new("By picture").lead("Worst first.").table(table(evaluated, &judged, &order)));
     for (title, lead, outcomes) in [
         (
             "Missed or wrong",
-            "Marks that were missed are red and dashed, detections that hit nothing red.",
+            "Missed marks are red and dashed; detections without a hit are red.",
             &[Outcome::Wrong, Outcome::Missed][..],
         ),
-        ("False alarms", "The part is not on these pictures.", &[Outcome::FalseAlarm]),
+        ("False alarms", "The part is not in these pictures.", &[Outcome::FalseAlarm]),
         (
             "Right",
-            "Every part found, nothing wrong: marks white, detections green with their scores, the grasp orange.",
+            "All parts were found, and no detection is wrong: marks are white, detections green with their scores, \
+             grasps orange.",
             &[Outcome::Right],
         ),
-        ("Quiet", "Pictures without the part on which nothing was detected.", &[Outcome::Quiet]),
+        ("Quiet", "Pictures without the part in which nothing was detected.", &[Outcome::Quiet]),
     ] {
         let here = order.iter().take(MAX_DRAWN).filter(|&&at| outcomes.contains(&judged[at].outcome()));
         let figures = here.map(|&at| figure(&evaluated.tested[at], &judged[at])).collect::<Result<Vec<_>>>()?;
@@ -81,7 +82,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     Ok(report.section(this_run(evaluated, command)).footer(FOOTER))
 }
 
-/// The number of errors of any kind, and of those that would cause a wrong grasp: the worst picture has most.
+/// The number of all errors, and of those that would cause a wrong grasp; the worst picture has the most.
 fn num_errors(judged: &Judged) -> (usize, usize) {
     let all = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
     (all, judged.wrong())
@@ -109,9 +110,9 @@ fn key_figures(totals: &Totals) -> Vec<KeyFigure> {
         figures.push(alarms.tone(none(totals.false_alarms.count)));
     }
     if let Some(errors) = totals.errors {
-        let label = format!("median error of place: {:.1} % of the diagonal", errors.median_percent);
+        let label = format!("median position error: {:.1} % of the diagonal", errors.median_percent);
         figures.push(KeyFigure::new(format!("{:.1}", errors.median_px), "px", label));
-        figures.push(KeyFigure::new(format!("{:.1}", errors.median_deg), "°", "median error of turn"));
+        figures.push(KeyFigure::new(format!("{:.1}", errors.median_deg), "°", "median angle error"));
     }
     figures
 }
@@ -126,7 +127,7 @@ fn at_a_glance(totals: &Totals, offset: Option<&LabelOffset>) -> Section {
         }
     }
     let mut section = Section::new("At a glance")
-        .lead("A picture is clean when something on it is right and nothing is wrong.")
+        .lead("A picture is clean if it has a correct detection and no wrong one.")
         .shares(chart);
     if let Some(offset) = offset {
         let words = offset.in_words();
@@ -139,15 +140,15 @@ fn at_a_glance(totals: &Totals, offset: Option<&LabelOffset>) -> Section {
     if let Some(errors) = totals.errors {
         section = section.facts([
             (
-                "error of place, median",
+                "position error, median",
                 format!("{:.2} px, {:.2} % of the diagonal", errors.median_px, errors.median_percent),
             ),
             (
-                "error of place, 95 % within",
+                "position error, 95 % within",
                 format!("{:.2} px, {:.2} % of the diagonal", errors.p95_px, errors.p95_percent),
             ),
-            ("error of turn, median", format!("{:.2}°", errors.median_deg)),
-            ("error of turn, 95 % within", format!("{:.2}°", errors.p95_deg)),
+            ("angle error, median", format!("{:.2}°", errors.median_deg)),
+            ("angle error, 95 % within", format!("{:.2}°", errors.p95_deg)),
         ]);
     }
     section
@@ -159,7 +160,7 @@ fn min_score_chart(evaluated: &Evaluated) -> Chart {
         swept.iter().filter_map(|(min_score, totals)| Some((*min_score, share(totals).percent()?))).collect()
     };
     let mut chart =
-        Chart::new("Found and false alarms", Axis::new("least score"), Axis::new("share").unit("%").from_zero())
+        Chart::new("Found and false alarms", Axis::new("minimum score"), Axis::new("fraction").unit("%").from_zero())
             .moment(evaluated.min_score, "counted from here");
     for (name, points) in [
         ("parts found", curve(|totals| totals.found)),
@@ -171,7 +172,8 @@ fn min_score_chart(evaluated: &Evaluated) -> Chart {
         }
     }
     chart.caption(
-        "To the left more is found and more is wrong. Scores are calibrated so that 0.5 separates right from wrong.",
+        "Towards the left, more parts are found and more detections are wrong. Scores are calibrated so that 0.5 \
+         separates correct detections from wrong ones.",
     )
 }
 
@@ -185,7 +187,7 @@ fn table(evaluated: &Evaluated, judged: &[Judged], order: &[usize]) -> Table {
         Column::number("best score"),
         Column::number("place").unit("px").group("largest error"),
         Column::number("place").unit("%").group("largest error"),
-        Column::number("turn").unit("°").group("largest error"),
+        Column::number("angle").unit("°").group("largest error"),
         Column::number("time").unit("s"),
     ]);
     for &at in order {
@@ -257,7 +259,7 @@ pub fn in_words(tested: &Tested, judged: &Judged) -> String {
 
 /// Draws the marks, and the detections on top.
 fn draw(image: &mut RgbImage, tested: &Tested, judged: &Judged) {
-    // Three pixels at a width of 640: marks are distinguishable when two pictures share a row of the page.
+    // Three pixels at a width of 640, so that marks are visible when a row of the page has two pictures.
     let width = (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0);
     for (instance_idx, instance) in tested.picture.instances.iter().enumerate() {
         let missed = !judged.is_found(instance_idx) && !instance.optional;

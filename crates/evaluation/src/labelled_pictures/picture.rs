@@ -1,4 +1,4 @@
-//! A labelled picture: its file, and the part's instances in it.
+//! A labelled picture: its file, and the instances of the part in it.
 
 use std::path::{Path, PathBuf};
 
@@ -8,23 +8,23 @@ use serde::Serialize;
 /// An instance of the part in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
-    /// The box around it.
+    /// The box around the instance.
     pub bbox: BoundingBox,
-    /// The marked grasp; an optional instance may lack it.
+    /// The marked grasp; only an optional instance may lack it.
     pub grasp: Option<GraspLine>,
-    /// Counts neither as missed nor as wrong: flagged as optional, used for teaching, or not completely in the searched
-    /// region.
+    /// Whether the instance counts neither as missed nor as wrong: it is flagged as optional, was used for teaching, or
+    /// is not completely in the searched region.
     pub optional: bool,
     /// Size and symmetry, if the labels state them.
     pub extent: Option<Extent>,
 }
 
-/// The scale for measuring a hit.
+/// The scale by which hits are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// The diagonal of the demonstration's box, scaled to the instance's size.
     pub diagonal_px: f64,
-    /// The equivalent turns.
+    /// The equivalent rotations.
     pub symmetry: RotationalSymmetry,
 }
 
@@ -32,13 +32,13 @@ pub struct Extent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledPicture {
     pub path: PathBuf,
-    /// Its label file.
+    /// The label file of the picture.
     pub labels: PathBuf,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// The part's instances; empty if the part is not in the picture.
+    /// The instances of the part; empty if the part is not in the picture.
     pub instances: Vec<Instance>,
-    /// The kind of picture, if the labels name it.
+    /// The kind of picture, if the labels state it.
     pub kind: Option<String>,
 }
 
@@ -52,17 +52,17 @@ impl LabelledPicture {
         }
     }
 
-    /// The file's name.
+    /// The file name.
     pub fn name(&self) -> String {
         file_name(&self.path)
     }
 }
 
-/// A file of the folder that is not counted, and the reason.
+/// A file of the folder that is left out, and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
     pub file: String,
-    /// Why it was left out, for display.
+    /// The reason, for display.
     pub why: String,
 }
 

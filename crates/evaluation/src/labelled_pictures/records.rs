@@ -10,7 +10,7 @@ use super::label_offset::label_offset;
 use super::picture::LeftOut;
 use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, by_kind, judge, sweep};
 
-/// A model tested on a folder.
+/// A model, tested on a folder.
 pub struct Evaluated<'a> {
     pub folder: &'a Path,
     pub model_file: &'a Path,
@@ -19,11 +19,11 @@ pub struct Evaluated<'a> {
     pub verification: Verification,
     /// Minimum score of accepted detections.
     pub min_score: f64,
-    /// The pictures and their detections.
+    /// The pictures with their detections.
     pub tested: Vec<Tested>,
-    /// Files of the folder that are not counted.
+    /// Files of the folder that are left out.
     pub left_out: Vec<LeftOut>,
-    /// Number of instances with other labels, which are not the part.
+    /// Number of instances with labels of other objects.
     pub others: usize,
 }
 
@@ -34,7 +34,7 @@ impl Evaluated<'_> {
     }
 }
 
-/// All results as one object; pixels, percent of the diagonal, degrees.
+/// All results as one object; the units are pixels, percent of the diagonal, and degrees.
 pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -74,7 +74,7 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     })
 }
 
-/// The counts for other minimum scores.
+/// The totals at other minimum scores.
 pub fn by_min_score(tested: &[&Tested]) -> Vec<Value> {
     let at = |(min_score, totals): (f64, Totals)| {
         json!({
@@ -88,7 +88,7 @@ pub fn by_min_score(tested: &[&Tested]) -> Vec<Value> {
     sweep(tested).into_iter().map(at).collect()
 }
 
-/// The counts of each kind of picture named in the labels.
+/// The totals of each kind of picture that the labels name.
 pub fn by_kind_json(tested: &[&Tested], min_score: f64) -> Vec<Value> {
     let of_kind = |(kind, totals): (&str, Totals)| {
         json!({

@@ -1,6 +1,6 @@
 //! Compares detections with labels: hits, missed parts, wrong detections.
 //!
-//! Distances are in pixels of the picture, angles in degrees; the position of a detection is the middle of its grasp.
+//! Distances are in pixels of the picture, angles in degrees. The position of a detection is the centre of its grasp.
 
 use std::time::Instant;
 
@@ -21,37 +21,37 @@ pub(super) const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
 pub(super) const MAX_ANGLE_DEG: f64 = 10.0;
 /// Minimum overlap (IoU) of a detection with an optional instance that has no grasp.
 const SAME_PART_IOU: f64 = 0.5;
-/// Number of steps of the minimum score for which everything is counted again.
+/// Number of steps of the minimum score for which the totals are computed.
 const NUM_SWEEP_STEPS: u32 = 50;
 
-/// The position of an instance, and the scale of tolerances.
+/// The ground truth of an instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// The grasp; only an optional instance may lack it.
+    /// The true grasp; only an optional instance may lack it.
     pub grasp: Option<TrueGrasp>,
     pub bbox: BoundingBox,
-    /// Whether it may be missed.
+    /// Whether the instance may be missed.
     pub optional: bool,
 }
 
 /// The true grasp of an instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueGrasp {
-    /// The middle of the marks.
+    /// The centre of the marks.
     pub center: Point2<f64>,
     /// The direction of the marks.
     pub angle: Angle,
     /// The diagonal of the demonstration's box, scaled to this instance's size.
     pub diagonal_px: f64,
-    /// The equivalent turns.
+    /// The equivalent rotations.
     pub symmetry: RotationalSymmetry,
-    /// Size of a pixel there in the plane of the marks, in metres, if the camera is known.
+    /// Size of a pixel at the grasp, in the plane of the marks, in metres; `None` if the camera is unknown.
     pub pixel_m: Option<f64>,
 }
 
 impl Truth {
-    /// An instance. Unless its labels state them, its size follows from the length of its marks (the mean over several
-    /// demonstrations), and its symmetry is the model's.
+    /// The ground truth of an instance. If the labels do not state its size and symmetry, the size follows from the
+    /// length of its marks (relative to the mean over several demonstrations), and the symmetry is the model's.
     pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
@@ -89,11 +89,11 @@ impl TrueGrasp {
 pub struct Tested {
     /// The picture and its labels.
     pub picture: LabelledPicture,
-    /// The position of each of its instances.
+    /// The ground truth of each instance of the picture.
     pub truths: Vec<Truth>,
     /// All detections, whatever their score.
     pub detections: Vec<GraspDetection>,
-    /// Duration of the detection.
+    /// Duration of the detection, in seconds.
     pub seconds: f64,
 }
 
@@ -123,31 +123,31 @@ impl Tested {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     pub instance_idx: usize,
-    /// Its error; `None` for an optional instance without a grasp.
+    /// The error of the detection; `None` for an optional instance without a grasp.
     pub error: Option<HitError>,
 }
 
-/// The error of a detection against the marks.
+/// The error of a detection relative to the marks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HitError {
-    /// Between the middles of both grasps, in pixels.
+    /// Distance between the centres of both grasps, in pixels.
     pub px: f64,
-    /// The same in millimetres in the plane of the marks, if the camera is known.
+    /// The distance in millimetres in the plane of the marks, if the camera is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mm: Option<f64>,
-    /// The same in percent of the instance's diagonal.
+    /// The distance in percent of the instance's diagonal.
     pub percent: f64,
-    /// The angle between both, in degrees, at most 180.
+    /// The angle between both grasps, in degrees, at most 180.
     pub deg: f64,
 }
 
 impl HitError {
-    /// Whether the position is right.
+    /// Whether the position is within the tolerance.
     pub fn is_in_place(&self) -> bool {
         self.percent <= 100.0 * MAX_DISTANCE_DIAGONALS
     }
 
-    /// Whether position and angle are right.
+    /// Whether position and angle are within their tolerances.
     pub fn is_hit(&self) -> bool {
         self.is_in_place() && self.deg <= MAX_ANGLE_DEG
     }
@@ -157,22 +157,22 @@ impl HitError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Everything was found, and nothing is wrong.
+    /// All parts were found, and no detection is wrong.
     Right,
-    /// Parts were missed; nothing is wrong.
+    /// Parts were missed, and no detection is wrong.
     Missed,
     /// A detection in a picture with the part is not a hit.
     Wrong,
-    /// The part is not there, and nothing was detected.
+    /// The part is not in the picture, and nothing was detected.
     Quiet,
-    /// The part is not there, and was detected.
+    /// The part is not in the picture, and something was detected.
     FalseAlarm,
 }
 
-/// The detections that count, each with its hit or none.
+/// The detections that count, each with its hit, if any.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// For each detection of [`Tested::detections`] above the minimum score, its hit.
+    /// The hit of each detection in [`Tested::detections`] that has at least the minimum score.
     pub hits: Vec<Option<Hit>>,
     /// Whether each instance was found.
     found: Vec<bool>,
@@ -185,12 +185,12 @@ impl Judged {
         !self.optional.is_empty()
     }
 
-    /// Found and all instances that must be found.
+    /// Number of instances found, of all that must be found.
     pub fn parts(&self) -> Share {
         Share::of(self.found.iter().zip(&self.optional).filter(|(_, optional)| !**optional), |(found, _)| **found)
     }
 
-    /// Found and all optional instances.
+    /// Number of optional instances found, of all of them.
     pub fn optional(&self) -> Share {
         Share::of(self.found.iter().zip(&self.optional).filter(|(_, optional)| **optional), |(found, _)| **found)
     }
@@ -211,7 +211,7 @@ impl Judged {
         if self.has_part() { self.hits.iter().filter(|hit| hit.is_none()).count() } else { 0 }
     }
 
-    /// Whether a picture with the part has a hit and nothing wrong.
+    /// Whether a picture with the part has a hit and no wrong detection.
     pub fn is_clean(&self) -> bool {
         self.found.contains(&true) && self.wrong() == 0
     }
@@ -232,14 +232,14 @@ impl Judged {
         }
     }
 
-    /// Errors of the parts that must be found and were; optional instances do not count.
+    /// Errors of the found parts; optional instances do not count.
     pub fn errors(&self) -> impl Iterator<Item = &HitError> {
         let on_parts = self.hits.iter().flatten().filter(|hit| !self.optional[hit.instance_idx]);
         on_parts.filter_map(|hit| hit.error.as_ref())
     }
 }
 
-/// Judges the detections with a score of at least `min_score`: in order of decreasing score, each takes the nearest
+/// Judges the detections with a score of at least `min_score`. In order of decreasing score, each takes the nearest
 /// free instance that it hits. No detection takes an instance from a better one, so a higher `min_score` only shortens
 /// the list.
 pub fn judge(tested: &Tested, min_score: f64) -> Judged {
@@ -255,7 +255,7 @@ pub fn judge(tested: &Tested, min_score: f64) -> Judged {
     Judged { hits, found, optional: tested.truths.iter().map(|truth| truth.optional).collect() }
 }
 
-/// The nearest free instance that a grasp hits.
+/// The nearest free instance that a grasp hits, as a hit.
 fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp) -> Option<Hit> {
     let free = truths.iter().enumerate().filter(|(instance_idx, _)| !taken[*instance_idx]);
     free.filter_map(|(instance_idx, truth)| Some((instance_idx, truth.grasp?.error_of(grasp))))
@@ -264,7 +264,7 @@ fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp) -> Option<Hit>
         .map(|(instance_idx, error)| Hit { instance_idx, error: Some(error) })
 }
 
-/// The free instance without a grasp that has the detection's box.
+/// The free instance without a grasp whose box overlaps the detection's box enough, as a hit.
 fn without_grasp(truths: &[Truth], taken: &[bool], bbox: &BoundingBox) -> Option<Hit> {
     let is_same = |(instance_idx, truth): &(usize, &Truth)| {
         truth.grasp.is_none() && !taken[*instance_idx] && truth.bbox.iou(bbox) >= SAME_PART_IOU
@@ -273,16 +273,16 @@ fn without_grasp(truths: &[Truth], taken: &[bool], bbox: &BoundingBox) -> Option
     Some(Hit { instance_idx, error: None })
 }
 
-/// Totals of all pictures.
+/// Totals over all pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Totals {
-    /// Parts found, of those that must be found.
+    /// Parts found, of all that must be found.
     pub found: Share,
     pub missed: usize,
     /// Number of detections without a hit in pictures with the part.
     pub wrong: usize,
     pub optional: Share,
-    /// Pictures with the part that have a hit and nothing wrong.
+    /// Pictures with the part that have a hit and no wrong detection.
     pub clean: Share,
     /// Pictures without the part that have a detection.
     pub false_alarms: Share,
@@ -342,7 +342,7 @@ impl Errors {
     }
 }
 
-/// The totals for each kind of picture named in the labels, in order of first appearance.
+/// The totals for each kind of picture that the labels name, in order of first appearance.
 pub fn by_kind<'a>(tested: &[&'a Tested], min_score: f64) -> Vec<(&'a str, Totals)> {
     let mut kinds: Vec<(&str, Vec<Judged>)> = Vec::new();
     for tested in tested {
@@ -356,7 +356,7 @@ pub fn by_kind<'a>(tested: &[&'a Tested], min_score: f64) -> Vec<(&'a str, Total
     kinds.into_iter().map(|(kind, judged)| (kind, Totals::of(&judged))).collect()
 }
 
-/// The totals for minimum scores from 0 to 1.
+/// The totals at minimum scores from 0 to 1.
 pub fn sweep(tested: &[&Tested]) -> Vec<(f64, Totals)> {
     (0..=NUM_SWEEP_STEPS)
         .map(|step| {
@@ -372,7 +372,7 @@ mod tests {
     use super::*;
     use sdg_grasp::TurnSource;
 
-    /// An instance with a diagonal of 100 pixels: hits are within 4 pixels.
+    /// An instance with a diagonal of 100 pixels, so that hits are within 4 pixels.
     fn truth(x: f64, degrees: f64, optional: bool) -> Truth {
         let grasp = TrueGrasp {
             center: Point2::new(x, 50.0),
@@ -416,7 +416,7 @@ mod tests {
 
     #[test]
     fn a_hit_lies_within_four_percent_and_ten_degrees() {
-        // The limit is inclusive; 3.9 and 9.9 avoid rounding of the last bit.
+        // The limit is inclusive; 3.9 and 9.9 avoid the rounding of the last bit.
         for (dx, turn, is_hit) in
             [(3.9, 9.9, true), (4.1, 0.0, false), (0.0, 10.1, false), (-3.9, -9.9, true), (0.0, 180.0, false)]
         {
@@ -445,8 +445,8 @@ mod tests {
 
     #[test]
     fn one_detection_to_one_instance_from_the_best_score_on() {
-        // Both detections hit both instances. The better one takes the nearer instance, the other takes the remaining
-        // one.
+        // Both detections hit both instances. The better one takes the nearer instance, and the other one the remaining
+        // instance.
         let found = judged(
             vec![truth(100.0, 0.0, false), truth(103.0, 0.0, false)],
             vec![detection(102.0, 0.0, 0.9), detection(102.5, 0.0, 0.8), detection(102.0, 0.0, 0.7)],
@@ -464,8 +464,8 @@ mod tests {
         assert_eq!((missed.missed(), missed.wrong(), missed.outcome()), (0, 0, Outcome::Right));
         let hit = judged(truths(), vec![detection(200.0, 0.0, 0.9)]);
         assert_eq!((hit.missed(), hit.wrong(), hit.optional()), (1, 0, Share { count: 1, of: 1 }));
-        // There is a hit and nothing wrong, although the part was missed; the error of the optional instance is not
-        // counted.
+        // There is a hit and no wrong detection, although the part was missed. The error of the optional instance is
+        // not counted.
         assert!(hit.is_clean() && hit.errors().next().is_none());
         assert_eq!(hit.outcome(), Outcome::Missed);
     }
@@ -473,7 +473,7 @@ mod tests {
     #[test]
     fn an_optional_instance_without_a_grasp_is_hit_by_its_box() {
         let box_alone = Truth { grasp: None, ..truth(200.0, 0.0, true) };
-        // Boxes of 10 pixels overlap by 7 of 13 at a distance of 3, by 6 of 14 at a distance of 4.
+        // Boxes of 10 pixels have an overlap of 7 of 13 at a distance of 3, and of 6 of 14 at a distance of 4.
         for (x, wrong) in [(203.0, 0), (204.0, 1)] {
             let found = judged(vec![truth(100.0, 0.0, false), box_alone], vec![detection(x, 90.0, 0.9)]);
             assert_eq!((found.wrong(), found.optional().count), (wrong, 1 - wrong), "{x}");
@@ -493,10 +493,10 @@ mod tests {
         let totals = at(0.5);
         assert_eq!((totals.found, totals.missed, totals.wrong), (Share { count: 2, of: 4 }, 2, 1));
         assert_eq!((totals.clean, totals.false_alarms), (Share { count: 1, of: 3 }, Share { count: 1, of: 2 }));
-        // Errors of 1 and 3 pixels, of 0 and 4 degrees: the median is between.
+        // The errors are 1 and 3 pixels, 0 and 4 degrees; the medians are between them.
         let errors = totals.errors.unwrap();
         assert!((errors.median_px - 2.0).abs() < 1e-9 && (errors.median_deg - 2.0).abs() < 1e-9, "{errors:?}");
-        // Without the weak detections: one wrong detection less, and one more clean picture.
+        // Without the weak detections, there is one wrong detection less and one more clean picture.
         let strict = at(0.65);
         assert_eq!((strict.wrong, strict.clean.count, strict.false_alarms.count), (0, 2, 1));
         let lax = at(0.0);

@@ -1,10 +1,10 @@
-//! Detects in a picture the demonstrations of a model: pixel by pixel, or as a recompressed copy.
+//! Finds a model's demonstrations in a picture: with identical pixels, or in a recompressed copy.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_grasp::TaughtDemonstration;
 
-/// The middles of the grasps of those demonstrations that were cut from this picture, in its pixels.
+/// The grasp points of the demonstrations that were cut out of this picture, in its pixels.
 pub fn taught_grasps(picture: &RgbImage, demonstrations: &[TaughtDemonstration]) -> Vec<Point2<f64>> {
     let place = |demonstration: &TaughtDemonstration| {
         let exactly = find_exactly(picture, &demonstration.cutout);
@@ -14,7 +14,7 @@ pub fn taught_grasps(picture: &RgbImage, demonstrations: &[TaughtDemonstration])
     demonstrations.iter().filter_map(place).collect()
 }
 
-/// Left and top of the first position at which the picture is identical to the cut-out.
+/// Left and top of the first position at which the picture equals the cut-out.
 fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     const CHANNELS: usize = 3;
     let (width, height) = cutout.dimensions();
@@ -27,7 +27,7 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     };
     let same =
         |x: u32, y: u32, dy: u32| picture.as_raw()[row(picture, x, y + dy)] == cutout.as_raw()[row(cutout, 0, dy)];
-    // The part crosses the middle row, so even on a plain background few positions pass this test.
+    // The part crosses the middle row, so that few positions pass this test even on a plain background.
     let middle = height / 2;
     for y in 0..=picture.height() - height {
         for x in 0..=picture.width() - width {
@@ -39,10 +39,11 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     None
 }
 
-/// Maximum mean difference between a copy and the photo, in 8-bit levels: JPEG of quality 50 causes about 4.
+/// Maximum mean difference between a copy and the photo, in 8-bit levels; a JPEG of quality 50 causes about 4.
 const MAX_COPY_DIFFERENCE: f64 = 5.0;
 
-/// Left and top of the cut-out in a copy of the whole photo, at the same size; `None` if it is another picture.
+/// Left and top of the cut-out in a copy of the whole photo, at the same size; `None` if the picture is a different
+/// one.
 fn find_copy(picture: &RgbImage, demonstration: &TaughtDemonstration) -> Option<[u32; 2]> {
     let middle = demonstration.marks.photo_middle?;
     let side = |size: u32, middle: f64| {
@@ -70,7 +71,7 @@ mod tests {
     use super::*;
     use image::{Rgb, imageops};
 
-    /// A picture without two equal places.
+    /// A picture in which no two places are equal.
     fn picture() -> RgbImage {
         RgbImage::from_fn(60, 40, |x, y| Rgb([(x * 4) as u8, (y * 6) as u8, (x * y) as u8]))
     }

@@ -15,15 +15,15 @@ use serde_json::Value;
 use super::picture::{Extent, Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
 
-/// The file's name in a folder of pictures.
+/// The name of the file in a folder of pictures.
 pub const TRUTH_FILE: &str = "truth.json";
 /// Value of `kind` for a picture with a look-alike of the part.
 const LOOK_ALIKE: &str = "neg_look";
 /// Value of `what` for a look-alike that is the part's mirror image.
 const MIRROR_IMAGE: &str = "mirror image";
-/// The kind of pictures with such a look-alike.
+/// The kind of pictures with a mirrored look-alike.
 const MIRRORED_LOOK_ALIKE: &str = "neg_mirror";
-/// Maximum deviation, in degrees, of a symmetry from an integer number of turns; smaller deviations are rounded.
+/// Maximum deviation of a symmetry from 360 degrees over an integer; smaller deviations are rounded.
 const MAX_ROUNDING_DEG: f64 = 0.01;
 
 /// The entry of one picture.
@@ -56,11 +56,11 @@ struct RawInstance {
 }
 
 impl TruthEntry {
-    /// Reads and checks a folder's file, except for the pictures' contents.
+    /// Reads and checks the file of a folder, except for the pictures' contents.
     ///
     /// # Errors
-    /// The file is not such a list, an entry lacks a field or has a wrong value, or a picture is missing or has two
-    /// entries.
+    /// The file is not a list of entries, an entry lacks a field or has a wrong value, or a picture is missing or has
+    /// two entries.
     pub fn read_all(folder: &Path) -> Result<Vec<Self>> {
         let path = folder.join(TRUTH_FILE);
         let bytes = sdg_files::read(&path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
@@ -114,10 +114,10 @@ impl RawInstance {
             bail!("expected symmetry_deg to be 360 over an integer of 1 to 360, found {}", self.symmetry_deg);
         }
         let symmetry = if turns == 1.0 { RotationalSymmetry::None } else { RotationalSymmetry::Fold(turns as u32) };
-        // Middle and direction count; the points have been rounded again.
+        // Only the centre and the direction are used, because the points were rounded.
         let (sin, cos) = Angle::from_degrees(self.angle_deg).radians().sin_cos();
         let (center, half) = (Point2::from(self.centre_px), half_length * Vector2::new(cos, sin));
-        // The file has no box, which is only drawn: a square with the same diagonal is used.
+        // The file has no box. A square with the same diagonal is used, which is only drawn.
         let side = self.diag_px * std::f64::consts::FRAC_1_SQRT_2;
         let [left, top] = self.centre_px.map(|middle| middle - 0.5 * side);
         Ok(Instance {
@@ -129,10 +129,10 @@ impl RawInstance {
     }
 }
 
-/// The pictures of the file, each with the positions from which the model's own demonstrations were cut.
+/// The pictures of the file, each with the positions at which the model's own demonstrations were cut out.
 ///
 /// # Errors
-/// Those of [`TruthEntry::read_all`]; pictures cannot be read.
+/// The errors of [`TruthEntry::read_all`]; or pictures cannot be read.
 pub(super) fn read_truth(
     folder: &Path,
     detector: &Perception,
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// A picture with an instance of diagonal 100 pixels that looks the same after half a turn.
+    /// A picture with an instance with a diagonal of 100 pixels and a symmetry of 180 degrees.
     fn entry() -> Value {
         let instance = serde_json::json!({"points_px": [[10, 20], [40, 60]], "centre_px": [25, 40], "angle_deg": 53.13,
             "diag_px": 100, "symmetry_deg": 180, "optional": false, "how": "by eye"});

@@ -1,4 +1,4 @@
-//! Each model on every part's photo: on its own photo it must find the part, on others nothing.
+//! Runs each model on every part's photo: it must find the part in its own photo, and nothing in the others.
 
 use anyhow::{Context, Result};
 use image::RgbImage;
@@ -15,12 +15,12 @@ pub struct CrossCheck {
     pub scores: Vec<Vec<f64>>,
 }
 
-/// Two parts of which one's model accepts the other's photo.
+/// Two parts, where the model of one accepts the photo of the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LookAlikePair {
     /// Indices of the two parts.
     pub parts: [usize; 2],
-    /// Score of the first's model on the second's photo, and vice versa.
+    /// Score of the first part's model on the second part's photo, and the reverse.
     pub scores: [f64; 2],
 }
 
@@ -48,7 +48,7 @@ impl CrossCheck {
         self.scores[part][part] >= DEFAULT_MIN_SCORE
     }
 
-    /// The pairs that would be confused, highest scores first.
+    /// The pairs that would be confused, in order of decreasing score.
     pub fn look_alikes(&self) -> Vec<LookAlikePair> {
         let num_parts = self.scores.len();
         let pairs = (0..num_parts).flat_map(|a| (a + 1..num_parts).map(move |b| [a, b]));

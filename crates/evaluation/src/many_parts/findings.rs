@@ -5,10 +5,10 @@ use serde_json::{Value, json};
 use super::cross_check::{CrossCheck, LookAlikePair};
 use super::part_store::PartOutcome;
 
-/// Minimum share of found held-back samples; below it, a part needs another photo.
+/// Minimum fraction of found held-out samples; with fewer, a part needs another photo.
 const MIN_FOUND: f64 = 0.75;
 
-/// The findings on all requested parts.
+/// The results of all requested parts.
 #[derive(Debug)]
 pub struct Findings {
     /// Every part and its outcome.
@@ -17,9 +17,9 @@ pub struct Findings {
     pub taught: Vec<String>,
     pub check: CrossCheck,
     pub look_alikes: Vec<LookAlikePair>,
-    /// Parts that need another photo, and why.
+    /// Parts that need another photo, and the reasons.
     pub need_photo: Vec<(String, String)>,
-    /// Photos without marks, and why they were left out.
+    /// Photos without marks, and the reasons why they are left out.
     pub left_out: Vec<(String, String)>,
 }
 
@@ -37,7 +37,7 @@ impl Findings {
                     Some("its model does not find it in its own photo".to_owned())
                 }
                 PartOutcome::Taught { found, parts, .. } if (*found as f64) < MIN_FOUND * *parts as f64 => {
-                    Some(format!("its model finds {found} of {parts} held-back samples"))
+                    Some(format!("its model finds it in {found} of {parts} held-out samples"))
                 }
                 PartOutcome::Taught { false_alarms, without_part, .. } if 2 * false_alarms > *without_part => {
                     Some(format!("its model finds it in {false_alarms} of {without_part} samples without it"))
@@ -49,12 +49,12 @@ impl Findings {
         Self { look_alikes: check.look_alikes(), parts, taught, check, need_photo, left_out }
     }
 
-    /// The names of a pair.
+    /// The names of the parts in a pair.
     pub fn names(&self, pair: &LookAlikePair) -> [&str; 2] {
         pair.parts.map(|part| self.taught[part].as_str())
     }
 
-    /// The findings as JSON.
+    /// The results as JSON.
     pub fn to_json(&self) -> Value {
         let listed = |pairs: &[(String, String)]| -> Vec<Value> {
             pairs.iter().map(|(name, why)| json!({ "name": name, "why": why })).collect()
@@ -103,7 +103,7 @@ mod tests {
             told,
             [
                 "b: not taught: no outline",
-                "c: its model finds 10 of 18 held-back samples",
+                "c: its model finds it in 10 of 18 held-out samples",
                 "d: its model finds it in 4 of 6 samples without it",
                 "e: its model does not find it in its own photo"
             ]

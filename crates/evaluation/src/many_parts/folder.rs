@@ -1,4 +1,4 @@
-//! A folder of demonstrations and its parts.
+//! A folder of demonstrations of several parts.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,22 +11,23 @@ use sdg_inputs::annotation_files::beside_photo;
 use sdg_inputs::demonstrations;
 use sdg_weights_conversion::sha256_of;
 
-/// File with symmetries of parts that differ from `--symmetry`: lines with a part's name and 1 to 360 or full.
+/// Name of the file with the symmetries of parts for which `--symmetry` does not apply: lines with a part's name and 1
+/// to 360 or full.
 const SYMMETRIES: &str = "symmetries.txt";
 const MAX_SYMMETRIES_BYTES: u64 = 1 << 20;
 
-/// The parts of a folder by name.
+/// The parts of a folder, sorted by name.
 #[derive(Debug)]
 pub struct DemonstrationFolder {
     pub parts: Vec<PartDemonstrations>,
-    /// Photos without marks, and why.
+    /// Photos without marks, and the reasons why they are left out.
     pub left_out: Vec<(String, String)>,
 }
 
-/// A part's photos with marks beside them.
+/// The photos of a part, with marks beside them.
 #[derive(Debug, Clone)]
 pub struct PartDemonstrations {
-    /// The photo's name without its extension, or the name of the folder with several photos.
+    /// The name of the photo without its extension, or the name of the folder of several photos.
     pub name: String,
     /// Photos and their marks.
     pub files: Vec<(PathBuf, PathBuf)>,
@@ -35,10 +36,10 @@ pub struct PartDemonstrations {
 }
 
 impl DemonstrationFolder {
-    /// Reads a folder: each photo with marks beside it is a part, and each subfolder with such photos is one.
+    /// Reads a folder. Each photo with marks beside it is a part; each subfolder with such photos is a part as well.
     ///
     /// # Errors
-    /// The folder cannot be read or has no marked photo; two parts have the same name; a symmetry is given for an
+    /// The folder cannot be read or has no photo with marks; two parts have the same name; a symmetry is given for an
     /// unknown part.
     pub fn read(folder: &Path, symmetry: impl Fn(&str) -> Result<RotationalSymmetry, String>) -> Result<Self> {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
@@ -53,8 +54,8 @@ impl DemonstrationFolder {
             };
             match found.get_mut(&name) {
                 Some(known) if is_own_part => bail!(
-                    "{}: expected one part of each name, found \"{name}\" in {}, too; several photos of a part go into a folder of \
-                     its name",
+                    "{}: expected one part of each name, found \"{name}\" also in {}; put several photos of a part \
+                     into a folder of its name",
                     photo.display(),
                     known.files[0].0.display()
                 ),
@@ -119,7 +120,7 @@ impl PartDemonstrations {
         self.files.iter().map(|(photo, marks)| demonstrations::read_pair(photo, marks)).collect()
     }
 
-    /// The first of its photos.
+    /// The first photo of the part.
     ///
     /// # Errors
     /// The photo cannot be read.
@@ -127,7 +128,7 @@ impl PartDemonstrations {
         sdg_inputs::read_image(&self.files[0].0)
     }
 
-    /// A hash of its files' contents.
+    /// Hashes of the contents of the part's files.
     ///
     /// # Errors
     /// Files cannot be read.

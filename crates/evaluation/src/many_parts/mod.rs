@@ -1,13 +1,14 @@
-//! Many parts taught from a folder of demonstrations, each model run on every other's photo, and a page of the results.
+//! Many parts that are taught from a folder of demonstrations; each model is run on every other part's photo. The
+//! results are one page.
 //!
 //! ```text
-//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other's photo
-//!                                                               └─ findings: look alike, need another photo ─ page
+//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other part's photo
+//!                                                               └─ findings: parts that look alike or need another photo ─ page
 //! OUT/models/NAME.sdg   OUT/parts/NAME.json   OUT/index.html
 //! ```
 //!
-//! Parts already taught from the same files with the same arguments are not taught again, so that an interrupted run
-//! can be continued, and parts taught by other processes (`--part`) are reused.
+//! Parts that were already taught from the same files with the same arguments are not taught again: an interrupted run
+//! can be continued, and parts taught by other processes (`--part`) are used.
 
 mod cross_check;
 mod findings;

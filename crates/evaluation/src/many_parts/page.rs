@@ -8,21 +8,22 @@ use super::part_store::PartOutcome;
 use crate::footer::FOOTER;
 use crate::machine::machine;
 
-/// Maximum number of pairs of photos shown; the table has all.
+/// Maximum number of pairs with photos on the page; the table has all pairs.
 const MAX_SHOWN: usize = 24;
-/// Maximum number of parts with a photo on the page; more would make the page too large for browsers.
+/// Maximum number of parts with a photo on the page; more photos would make the page too large for browsers.
 const MAX_PHOTOS: usize = 200;
-/// Width of each of two adjacent photos, px.
+/// Width of each of two photos side by side, in pixels.
 const PHOTO_WIDTH: u32 = 360;
 
-/// Look-alikes, parts that need another photo, and how well each part is found. `photos` are those of the taught parts.
+/// The page: look-alikes, parts that need another photo, and the results of each part. `photos` are those of the taught
+/// parts.
 pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
     let taught = findings.taught.len();
     let mut report = Report::new(format!("{taught} parts taught"))
         .kicker("Teaching")
         .lead(
-            "Each part was taught from its own photos, and each model was then run on every other part's photo. A part whose \
-             model accepts another's photo would be grasped instead of it.",
+            "Each part was taught from its own photos, and each model was then run on every other part's photo. If a model \
+             accepts the photo of another part, that part could be grasped by mistake.",
         )
         .key_figure(KeyFigure::new(taught.to_string(), "", format!("of {} parts have a model", findings.parts.len())))
         .key_figure(count(findings.look_alikes.len(), "pairs look alike"))
@@ -37,7 +38,10 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
             table = table.row(vec![Cell::text(name.clone()), Cell::text(why.clone())]);
         }
         section
-            .lead("Take the part in another light or place, on a plain background, and mark it as before.")
+            .lead(
+                "Photograph the part under other light or in another place, on a plain background, and mark it as \
+                   before.",
+            )
             .table(table)
     });
     report
@@ -51,7 +55,7 @@ fn count(count: usize, what: &str) -> KeyFigure {
 }
 
 fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
-    let section = Section::new("Which look alike");
+    let section = Section::new("Look-alikes");
     if findings.look_alikes.is_empty() {
         return section.paragraph("No model accepts another part's photo.");
     }
@@ -77,8 +81,10 @@ fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
         _ => "The most alike first.".to_owned(),
     };
     section
-        .lead("Scores from 0.5 on are accepted. Two names for one part, or parts that only a mark tells apart: put the mark into the photo, \
-               or give each its own place.")
+        .lead(
+            "Scores from 0.5 on are accepted. Two parts may be the same part with two names, or may differ only in \
+               a mark: include the mark in the photo, or keep each part in its own place.",
+        )
         .captioned_gallery(GallerySize::Large, figures, caption)
         .table(table)
 }
@@ -87,11 +93,11 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
     let mut table = Table::new(vec![
         Column::text("part"),
         Column::number("teaching").unit("s"),
-        Column::text("found").group("held-back samples"),
-        Column::number("wrong").group("held-back samples"),
-        Column::text("false alarms").group("held-back samples"),
-        Column::number("median").unit("px").group("held-back samples"),
-        Column::number("median").unit("°").group("held-back samples"),
+        Column::text("found").group("held-out samples"),
+        Column::number("wrong").group("held-out samples"),
+        Column::text("false alarms").group("held-out samples"),
+        Column::number("median").unit("px").group("held-out samples"),
+        Column::number("median").unit("°").group("held-out samples"),
         Column::number("own photo").group("score"),
         Column::number("most alike").group("score"),
         Column::text("which"),
@@ -119,7 +125,10 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
         table = table.row(row);
     }
     Section::new("Every part")
-        .lead("On samples made of its photos that nothing was taught with. The most alike is the other photo on which its model has its best score.")
+        .lead(
+            "On held-out samples of the part's photos. The most similar photo is the other part's photo on which \
+               the model has its best score.",
+        )
         .table(table)
         .gallery(GallerySize::Small, photos_of_parts(findings, photos))
 }

@@ -1,4 +1,4 @@
-//! The results of each part: its model's file, and a record of the teaching's inputs.
+//! Stores the results of each part: the model file, and a record of the teaching's inputs.
 
 use std::path::{Path, PathBuf};
 
@@ -24,31 +24,33 @@ pub struct PartRecord {
     pub outcome: PartOutcome,
 }
 
-/// Outcome of a teaching.
+/// The outcome of a teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartOutcome {
     Taught {
         seconds: f64,
-        /// Number of parts found in held-back samples, and of all parts.
+        /// Number of held-out samples in which the part was found.
         found: usize,
+        /// Number of held-out samples with the part.
         parts: usize,
-        /// Number of detections beside the part.
+        /// Number of wrong detections.
         wrong: usize,
-        /// Number of samples without the part in which it was found, and of all such samples.
+        /// Number of samples without the part in which it was found.
         false_alarms: usize,
+        /// Number of samples without the part.
         without_part: usize,
-        /// Median errors of found parts: in pixels of the photo, and in degrees.
+        /// Median errors of the found parts: distance in pixels of the photo, and angle in degrees.
         median: Option<[f64; 2]>,
     },
     Failed {
-        /// The reason, on one line.
+        /// The reason of the failure, on one line.
         why: String,
     },
 }
 
 impl PartOutcome {
-    /// With the figures on held-back samples.
+    /// The outcome with the results on held-out samples.
     pub fn taught(seconds: f64, figures: &HeldBackFigures) -> Self {
         let (found, false_alarms) = (figures.found(), figures.false_alarms());
         Self::Taught {
@@ -62,11 +64,11 @@ impl PartOutcome {
         }
     }
 
-    /// A short text.
+    /// The outcome as a short text.
     pub fn in_words(&self) -> String {
         match self {
             Self::Taught { seconds, found, parts, .. } => {
-                format!("finds {found} of {parts} held-back samples ({seconds:.1} s)")
+                format!("finds the part in {found} of {parts} held-out samples ({seconds:.1} s)")
             }
             Self::Failed { why } => format!("failed: {why}"),
         }
@@ -85,7 +87,7 @@ impl PartStore {
         Ok(Self(folder.to_owned()))
     }
 
-    /// Path of a part's model.
+    /// The path of a part's model.
     pub fn model_file(&self, part: &str) -> PathBuf {
         self.0.join("models").join(format!("{part}.sdg"))
     }
@@ -94,7 +96,7 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// The outcome of a part taught with this key; `None` if it was not taught, or with another key.
+    /// The stored outcome of a part for this key; `None` if there is none, or one for another key.
     ///
     /// # Errors
     /// The record cannot be read or is damaged.
@@ -108,7 +110,7 @@ impl PartStore {
         Ok((record.key == *key).then_some(record.outcome))
     }
 
-    /// Stores the outcome of a part. The record is written last: it states that the model is complete.
+    /// Stores the outcome of a part. The record is written last, because it states that the model is complete.
     ///
     /// # Errors
     /// Files cannot be written.

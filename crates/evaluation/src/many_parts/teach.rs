@@ -1,4 +1,4 @@
-//! Teaching one of many parts.
+//! Teaches one of many parts.
 
 use std::ops::ControlFlow;
 
@@ -10,7 +10,7 @@ use super::folder::PartDemonstrations;
 use super::part_store::PartOutcome;
 use crate::taught_file::TaughtFile;
 
-/// Teaches a part; its failure is a result. `None` if interrupted.
+/// Teaches a part. A failure is an outcome as well; `None` if interrupted.
 pub fn teach_part(
     part: &PartDemonstrations,
     options: &TeachOptions,

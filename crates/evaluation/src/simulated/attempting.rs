@@ -10,10 +10,10 @@ use super::records::{AttemptRecord, AttemptsRecord};
 use super::store::Store;
 use crate::rehearsal::Rehearsal;
 
-/// Continues the attempts in a file of the store, which depend on `settings`; `None` if interrupted.
+/// Continues the attempts in a file of the store for these settings; `None` if interrupted.
 ///
 /// # Errors
-/// Errors of files, OpenGL and settings. Failing physics is a failed attempt.
+/// Errors of files, OpenGL and settings. An attempt whose physics fails is a failed attempt.
 pub(super) fn go_on(
     rehearsal: &Rehearsal,
     store: &Store,
@@ -38,13 +38,13 @@ pub(super) fn go_on(
     Ok(Some(record.attempts))
 }
 
-/// The number of held parts, as a line.
+/// The number of attempts that held the part, as text.
 pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
     let held = attempts.iter().filter(|attempt| attempt.success).count();
     format!("held in {held} of {}", attempts.len())
 }
 
-/// Whether the physics failed (not files, OpenGL or settings): then only this attempt fails.
+/// Whether the physics failed (not files, OpenGL or settings), so that only this attempt fails.
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(
         error.downcast_ref::<SimulationError>(),

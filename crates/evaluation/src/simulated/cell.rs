@@ -1,4 +1,4 @@
-//! One model on one part: its name, and its files in the store.
+//! A cell, which is one model on one part: its name, and its files in the store.
 
 use anyhow::{Context, Result, anyhow};
 use sdg_grasp::{CheckConfig, Device, GraspModel, ModelKind, Verification};
@@ -15,62 +15,62 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// The cell whose network this cell's model uses.
+    /// The cell whose network is used by this cell's model.
     pub fn network(self) -> Self {
         Self { model: self.model.taught_as(), ..self }
     }
 
-    /// Whether its teaching failed: then there is nothing to test.
+    /// Whether the cell's teaching failed, so that there is no model to test.
     pub(super) fn is_without_model(self, marks: Marks, store: &Store) -> Result<bool> {
         Ok(matches!(self.teaching_from(marks, store)?, Some(TeachingRecord::Failed { .. })))
     }
 
-    /// A file of this cell.
+    /// The path of a file of this cell.
     pub(super) fn file(self, what: &str) -> String {
         format!("cells/{self}.{what}.json")
     }
 
-    /// The file of its network.
+    /// The path of the network's file.
     pub(super) fn model_file(self, marks: Marks) -> String {
         format!("models/{}{}.sdg", self.network(), marks.suffix())
     }
 
-    /// The file of its teaching's outcome.
+    /// The path of the file with the outcome of the teaching.
     pub(super) fn teaching_file(self, marks: Marks) -> String {
         self.network().file(&format!("teaching{}", marks.suffix()))
     }
 
-    /// The file of a picture with its detections.
+    /// The path of the picture with the detections.
     pub fn picture_file(self) -> String {
         format!("pictures/{self}.png")
     }
 
-    /// The outcome of teaching its network from the shipped demonstration, if available.
+    /// The stored outcome of teaching the network from the shipped demonstration.
     pub fn teaching(self, store: &Store) -> Result<Option<TeachingRecord>> {
         self.teaching_from(Marks::Shipped, store)
     }
 
-    /// The outcome of teaching its network from these marks, if available.
+    /// The stored outcome of teaching the network from these marks.
     pub fn teaching_from(self, marks: Marks, store: &Store) -> Result<Option<TeachingRecord>> {
         store.read_made_with(&self.teaching_file(marks), &store.settings().teaching())
     }
 
-    /// Its detections in pictures, if available.
+    /// The stored detections in pictures.
     pub fn look(self, store: &Store) -> Result<Option<LookRecord>> {
         store.read(&self.file("look"))
     }
 
-    /// Its attempts so far.
+    /// The stored attempts, in order.
     pub fn attempts(self, verification: Verification, store: &Store) -> Result<Vec<AttemptRecord>> {
         read_attempts(store, &self.file(&attempts_of(verification)), store.settings())
     }
 
-    /// Its speed, if measured.
+    /// The stored speed.
     pub fn speed(self, store: &Store) -> Result<Option<SpeedRecord>> {
         store.read(&self.file("speed"))
     }
 
-    /// Its model; `None` if teaching gave none.
+    /// The model; `None` if the teaching gave none.
     pub(super) fn read_model(self, marks: Marks, store: &Store) -> Result<Option<GraspModel>> {
         match self.teaching_from(marks, store)? {
             Some(TeachingRecord::Taught { .. }) => {}
@@ -82,7 +82,7 @@ impl Cell<'_> {
         Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
     }
 
-    /// The same for a camera that always has the height of the photo: the paper's protocol.
+    /// The model for a camera that is always at the height of the photo, as in the paper's protocol.
     pub(super) fn read_model_at_fixed_height(self, store: &Store) -> Result<Option<GraspModel>> {
         let at_fixed_height = |model: GraspModel| model.with_size_tolerance(CheckConfig::FIXED_HEIGHT_TOLERANCE);
         Ok(self.read_model(Marks::Shipped, store)?.map(at_fixed_height).transpose()?)
@@ -95,14 +95,14 @@ impl std::fmt::Display for Cell<'_> {
     }
 }
 
-/// The marks that a network is taught from.
+/// The marks from which a network is taught.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Marks {
-    /// Those of the shipped demonstration.
+    /// The marks of the shipped demonstration.
     Shipped,
-    /// Those of the shipped demonstration, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
+    /// The marks of the shipped demonstration, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
     Jittered,
-    /// Those of the shipped demonstration, in the plan view of the camera that took it.
+    /// The marks of the shipped demonstration, in the plan view of the camera that took it.
     InPlanView,
 }
 
@@ -117,10 +117,10 @@ impl Marks {
     }
 }
 
-/// The attempts in a file so far; empty if they were recorded by an earlier version, so that they are made again.
+/// The attempts stored in a file; empty if an earlier version recorded them, so that they are made again.
 ///
 /// # Errors
-/// Those of [`Store::read_made_with`].
+/// The errors of [`Store::read_made_with`].
 pub(super) fn read_attempts(store: &Store, name: &str, settings: &impl Serialize) -> Result<Vec<AttemptRecord>> {
     let record: Option<serde_json::Value> = store.read_made_with(name, settings)?;
     let Some(record) = record.filter(|record| record["version"] == AttemptsRecord::VERSION) else {
@@ -131,7 +131,7 @@ pub(super) fn read_attempts(store: &Store, name: &str, settings: &impl Serialize
     Ok(record.attempts)
 }
 
-/// The name of a cell's file of attempts.
+/// The name of the file with a cell's attempts.
 pub(super) fn attempts_of(verification: Verification) -> String {
     let way = match verification {
         Verification::ByShape => "verified",

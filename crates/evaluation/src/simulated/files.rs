@@ -13,10 +13,10 @@ use super::tables::markdown;
 use super::units::Evaluation;
 use crate::machine::machine;
 
-/// The written files, with the summaries.
+/// The written files and the summaries.
 #[derive(Debug)]
 pub struct WrittenTables {
-    /// One per group of parts.
+    /// The summary of each group of parts.
     pub summaries: Vec<Summary>,
     /// Number of remaining units.
     pub remaining: usize,
@@ -29,8 +29,7 @@ pub struct WrittenTables {
 }
 
 impl Evaluation<'_> {
-    /// Writes the tables of the finished units. `settings` are those shown to the reader, and `command` reproduces the
-    /// results.
+    /// Writes the tables of the finished units. The page states `settings`; `command` reproduces the results.
     ///
     /// # Errors
     /// Records cannot be read, or files cannot be written.
@@ -41,7 +40,7 @@ impl Evaluation<'_> {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("side by side", format!("{} units of work", self.jobs)),
+            ("in parallel", format!("{} units of work", self.jobs)),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];
@@ -65,7 +64,7 @@ impl Evaluation<'_> {
 }
 
 impl Summary {
-    /// One line per model.
+    /// One line for each model.
     pub fn lines(&self) -> String {
         let of = if self.group == PartGroup::HeldOut { " (held-out parts)" } else { "" };
         let line = |model: &ModelSummary| {

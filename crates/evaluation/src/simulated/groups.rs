@@ -1,4 +1,4 @@
-//! The parts in two groups with separate sums: those of the paper, and those on which no constant was ever fitted.
+//! Two groups of parts with separate sums: the paper's parts, and the parts on which no constant was ever fitted.
 
 use sdg_simulation::objects::ObjectSpec;
 use serde::Serialize;
@@ -8,12 +8,12 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum PartGroup {
     Paper,
-    /// Four other parts, held out of every choice.
+    /// Four other parts, which were used for no choice.
     HeldOut,
 }
 
 impl PartGroup {
-    /// Both, in the order of the reports.
+    /// Both groups, in the order of the reports.
     pub const ALL: [Self; 2] = [Self::Paper, Self::HeldOut];
 
     /// The group of a shipped part.
@@ -21,7 +21,7 @@ impl PartGroup {
         if ObjectSpec::held_out_names().any(|name| name == object) { Self::HeldOut } else { Self::Paper }
     }
 
-    /// Its name in headings.
+    /// The title in headings.
     pub fn title(self) -> &'static str {
         match self {
             Self::Paper => "The paper's parts",

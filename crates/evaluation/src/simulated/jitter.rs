@@ -1,4 +1,4 @@
-//! A demonstration with errors in every mark.
+//! Adds an error to every mark of a demonstration.
 
 use std::f64::consts::TAU;
 
@@ -11,12 +11,12 @@ use sdg_geometry::{BoundingBox, GraspLine};
 /// Displacement of every mark, in pixels of the photo.
 pub const MARKS_JITTER_PX: f64 = 3.0;
 
-/// Number of directions drawn for a vertex of the outline before it is left in place.
+/// Number of directions tried for a vertex of the outline before it is left in place.
 const MAX_VERTEX_TRIES: usize = 40;
 
 /// The demonstration with both grasp marks, two opposite corners of the box and every vertex of the outline moved by
-/// `distance_px`, each in its own direction, drawn uniformly from `seed`. A move that would make the outline cross
-/// itself is drawn again, so the outline remains valid on the annotation page. The jaw width is unchanged.
+/// `distance_px`, each in its own random direction. If a move would make the outline cross itself, another direction is
+/// tried, so that the outline remains valid on the annotation page. The jaw width is unchanged.
 pub fn with_jittered_marks(demonstration: &Demonstration, distance_px: f64, seed: u64) -> Demonstration {
     const MARKS: u64 = 0x4d41_524b_5300_0000;
     let mut rng = Pcg64Mcg::seed_from_u64(seed ^ MARKS);
@@ -73,7 +73,7 @@ mod tests {
             }
             let (before, after) = (shipped.annotation.outline.unwrap(), jittered.annotation.outline.unwrap());
             let (moved, of) = (num_moved(&before, &after), before.vertices.len());
-            // If vertices are a pixel or two apart, a few cannot be moved.
+            // If vertices are only a pixel or two apart, a few cannot be moved.
             assert!(10 * moved >= 9 * of, "{name}: {moved} of {of} moved");
         }
     }

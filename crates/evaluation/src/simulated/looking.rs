@@ -9,7 +9,7 @@ use sdg_simulation::views::{TestView, test_view, test_views};
 use super::records::{DetectionRecord, PictureRecord};
 use crate::trial::{Trial, try_view};
 
-/// A model's detections in a picture, in both ways; the trial is the verified one.
+/// A model's detections in a picture, with the check and without; the trial is the one with the check.
 pub(super) fn observe_picture(
     model: &GraspModel,
     object: &ObjectSpec,
@@ -26,8 +26,9 @@ pub(super) fn observe_picture(
     Ok((PictureRecord { seed, other_part, verified: DetectionRecord::new(&verified), alone }, verified))
 }
 
-/// A picture without the part: one to six unseen objects, some made to resemble parts. Every second picture also has
-/// another of the paper's eight parts, in turn: real parts in real finishes are the look-alikes found in a workshop.
+/// A picture without the part: one to six unseen objects, some of which resemble parts. Every second picture also has
+/// another of the paper's eight parts, one after another: real parts in real finishes are the look-alikes of a
+/// workshop.
 pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Result<(TestView, Option<&'static str>)> {
     if number.is_multiple_of(2) {
         return Ok((test_views(object, false, 1, seed).next().context("a picture")??, None));
@@ -37,18 +38,19 @@ pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Resu
     let mut config = VariationConfig::default();
     config.distractors = 1..=*config.distractors.end();
     let scene = SceneVariation::sample(Some(&ObjectSpec::by_name(other)?), &config, seed);
-    // The ground truth of the other part does not apply to this part.
+    // The ground truth of the other part is not that of this part.
     Ok((TestView { truth: None, ..test_view(scene)? }, Some(other)))
 }
 
-/// The seed of a part's scenes, as for `sdg rehearse --seed`: the same for every model, different for every part. With
-/// one seed for all parts, one unfavourable lamp would count eight times, and the intervals would be too narrow.
+/// The seed of a part's scenes, as for `sdg rehearse --seed`: the same for every model, and different for every part.
+/// With the same seed for all parts, one unfavourable lamp would count eight times, and the intervals would be too
+/// narrow.
 pub(super) fn part_seed(seed: u64, object: &ObjectSpec) -> u64 {
     let place = ObjectSpec::names().position(|name| name == object.name).unwrap_or(0);
     seed.wrapping_mul(1000).wrapping_add(place as u64)
 }
 
-/// Seeds of a part's pictures; they differ from those of attempts, of the demo and of tests.
+/// Seed of a part's pictures; differs from the seeds of attempts, of the demo and of tests.
 pub(super) fn picture_seed(seed: u64, object: &ObjectSpec, number: u64) -> u64 {
     const PICTURES: u64 = 0x5049_4354_5552_4553;
     part_seed(seed, object).wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(PICTURES).wrapping_add(number)
@@ -67,7 +69,7 @@ mod tests {
         assert_eq!(other, Some("rod_end"));
         assert_eq!(seen.scene.object.unwrap().spec.name, "rod_end");
         assert!(seen.truth.is_none());
-        // A held-out part is in no picture, and all eight are in its own pictures.
+        // A held-out part is in no other part's pictures, and all eight parts are in the pictures of a held-out part.
         for (name, expected) in [("pendulum", "fuel_line"), ("key", "pendulum")] {
             let object = ObjectSpec::by_name(name).unwrap();
             let others: Vec<_> =

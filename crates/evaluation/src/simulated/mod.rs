@@ -1,21 +1,23 @@
-//! The paper's protocol: every model taught on every part, tested on unseen pictures and in grasps, and its tables.
+//! The paper's protocol: every model is taught on every part, tested on unseen pictures and in grasps; the results are
+//! tables.
 //!
 //! ```text
-//! Evaluation ─ units ─ Queue ─ workers (a share of the cores each) ─ Store: a file for every unit, as it ends
-//!                                                                      │
-//!                              Speed, alone on all cores ──────────────┤
-//!                                                                      └─ Summary ─ tables: Markdown, JSON, page
+//! Evaluation ─ units ─ Queue ─ workers (the cores divided among them) ─ Store: a file for every finished unit
+//!                                                                         │
+//!                              Speed, alone on all cores ─────────────────┤
+//!                                                                         └─ Summary ─ tables: Markdown, JSON, page
 //! ```
 //!
 //! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work that is
-//! stored or lost as a whole: one teaching, one attempt, the pictures of one part. A **cell** is one model on one part.
-//! Random choices depend only on the seed, the part and the attempt's number, so every model gets the same scenes, and
-//! `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats them.
+//! stored completely or not at all: one teaching, one attempt, the pictures of one part. A **cell** is one model on one
+//! part. Random choices depend only on the seed, the part and the attempt's number, so every model gets the same
+//! scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats
+//! them.
 //!
-//! In [`sharing`], the same units are done by many processes, on the machines of a cluster.
+//! In [`sharing`], many processes do the same units, on the machines of a cluster.
 //!
-//! Units in the store are not done again, so an interrupted evaluation can be continued. A teaching without a model is
-//! a result too: all attempts of its cell count as failed.
+//! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching without a
+//! model is a result as well: all attempts of its cell count as failed.
 
 mod attempting;
 pub mod axes;

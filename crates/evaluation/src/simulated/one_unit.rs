@@ -1,4 +1,4 @@
-//! Runs one unit of work: panics become errors, the time is measured, and the result is reported.
+//! Runs one unit of work: a panic becomes an error, the time is measured, and the result is reported.
 
 use std::fmt::Display;
 use std::ops::ControlFlow;
@@ -9,14 +9,14 @@ use anyhow::{Result, anyhow};
 
 use crate::progress::Progress;
 
-/// The text for a unit whose teaching failed while it waited.
+/// The text for a unit whose teaching failed while the unit waited.
 pub(super) const NO_MODEL: &str = "there is no model";
 
-/// Runs a unit unless the run is interrupted, and reports its result; `work` returns a description, or `None` if it was
-/// interrupted.
+/// Runs a unit, unless the run is interrupted, and reports its result. `work` returns a description, or `None` if it
+/// was interrupted.
 ///
 /// # Errors
-/// Those of `work`, and its panic.
+/// The errors of `work`; a panic of `work` is an error as well.
 pub(super) fn do_unit(
     unit: &impl Display,
     is_interrupted: &(dyn Fn() -> bool + Sync),
@@ -32,9 +32,9 @@ pub(super) fn do_unit(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Turns a panic into an error, so that the other units are kept.
+/// Converts a panic to an error, so that the other units are kept.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
-    // Unwind safety: everything that the closure was changing is discarded with its unit.
+    // Unwind safety: all data that the closure was changing are dropped with its unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<&str>().map(|message| (*message).to_owned());
         let message = message.or_else(|| panic.downcast_ref::<String>().cloned());

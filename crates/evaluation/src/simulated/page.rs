@@ -12,13 +12,13 @@ use super::summary::{Figures, ModelSummary, Summary};
 use super::tables::{Titled, notice, tables, this_run};
 use crate::footer::FOOTER;
 
-/// Success at a glance, the tables and a picture of every cell, group by group.
+/// The page: charts of the success, the tables, and a picture of every cell, for each group.
 pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
     let parts: usize = summaries.iter().map(|summary| summary.cells.len() / summary.models.len().max(1)).sum();
     let letters = summaries.first().into_iter().flat_map(|summary| &summary.models).map(|model| model.model.letter());
     let mut report = Report::new("Every model on every part").kicker("Evaluation in simulation").lead(format!(
-        "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then looked for it and grasped it \
-         in poses that it had not seen.",
+        "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then searched for it and \
+         grasped it in unseen poses.",
         letters.collect::<Vec<_>>().join(", ")
     ));
     for summary in summaries {
@@ -30,7 +30,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
             report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
         }
     }
-    // In the first section of the page.
+    // The notice is in the first section of the page.
     let mut notice = summaries.first().and_then(notice);
     let mut begun = |section: Section| match notice.take() {
         Some(notice) => section.notice(Tone::Warning, notice),
@@ -66,7 +66,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
     Ok(report.section(this_run(facts, command)).footer(FOOTER))
 }
 
-/// Success compared with the paper's, and the steps at which attempts ended, by model and by part.
+/// The success compared with the paper's, and the steps at which attempts ended, by model and by part.
 fn plots(summary: &Summary, section: Section) -> Section {
     let mut shares = ShareChart::new("Attempts that held the part").reference_name("the paper");
     let mut by_model = outcomes("Where attempts end, by model");
@@ -85,7 +85,7 @@ fn plots(summary: &Summary, section: Section) -> Section {
         matrix.row(object.replace('_', " "), counts(cells.map(|cell| &cell.verified)))
     });
     section
-        .lead("With the check against the demonstration; the tables below give the numbers, and those without it.")
+        .lead("With the check against the demonstration; the tables below also have the numbers without it.")
         .shares(shares)
         .matrix(by_model)
         .matrix(by_part)
@@ -108,7 +108,7 @@ fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
     counts
 }
 
-/// The loss of each network, averaged over the parts; `None` if no curve was stored.
+/// The loss of each network, averaged over the parts; `None` if no loss was stored.
 fn losses(summary: &Summary) -> Option<Chart> {
     let mut chart = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
         .caption(format!("Mean of the parts and of {LOSS_STEPS} steps each."));

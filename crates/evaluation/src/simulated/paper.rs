@@ -1,27 +1,27 @@
-//! The paper's figures.
+//! The results of the paper.
 
 use sdg_grasp::ModelKind;
 
 /// A row of the paper's Table II, completed from its text.
 pub struct PaperRow {
     pub samples: &'static str,
-    /// From samples to model, on a GTX 1080 Ti, minutes and seconds.
+    /// Time from samples to model on a GTX 1080 Ti, in minutes and seconds.
     pub teaching: &'static str,
-    /// Size of the weights' files, in megabytes.
+    /// Size of the files of weights, in megabytes.
     pub size: &'static str,
     /// Images per second, on a GTX 1080 Ti.
     pub frames_per_second: &'static str,
-    /// Share of successful attempts, of 80 in simulation.
+    /// Percentage of successful attempts, of 80 in simulation.
     pub success_percent: f64,
 }
 
-/// Speed of model C on a CPU, as reported for its implementation in OpenDR, in images per second.
+/// Speed of model C on a CPU, in images per second, as reported for its implementation in OpenDR.
 pub const CPU_FRAMES_PER_SECOND: f64 = 0.4;
 
 /// The row of a model; `None` for a model that is not in the paper.
 ///
 /// # Source
-/// Table II; success with a decimal from section VI. For A, samples, times and sizes of both networks.
+/// Table II; the success is from section VI, with a decimal. For A: samples, times and sizes of both networks.
 pub fn row(model: ModelKind) -> Option<PaperRow> {
     Some(match model {
         ModelKind::A => PaperRow {

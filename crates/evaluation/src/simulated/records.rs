@@ -1,4 +1,4 @@
-//! Records of units of work, as stored.
+//! Stored records of units of work.
 
 use sdg_grasp::TeachingFacts;
 use sdg_report::DetectionError;
@@ -11,15 +11,15 @@ use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 /// Number of steps per stored value of a teaching's loss.
 pub const LOSS_STEPS: usize = 10;
 
-/// Outcome of a teaching.
+/// The outcome of a teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TeachingRecord {
-    /// There is a model.
+    /// The teaching gave a model.
     Taught {
-        /// Its description by the model.
+        /// The model's description of the teaching.
         facts: Box<TeachingFacts>,
-        /// Size of its file.
+        /// Size of the model file.
         bytes: usize,
         /// Number of units that ran in parallel.
         jobs: usize,
@@ -28,7 +28,7 @@ pub enum TeachingRecord {
         losses: Vec<f64>,
     },
     Failed {
-        /// The reason, on one line.
+        /// The reason of the failure, on one line.
         why: String,
     },
 }
@@ -36,27 +36,27 @@ pub enum TeachingRecord {
 /// A grasp attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptRecord {
-    /// Its number, from 1.
+    /// Number of the attempt, from 1.
     pub attempt: usize,
     /// Whether the part was held at the end.
     pub success: bool,
-    /// The step at which it ended.
+    /// The step at which the attempt ended.
     pub step: String,
-    /// Why it failed; empty on success.
+    /// The reason of the failure; empty on success.
     pub why: String,
     /// Position error of the last detection, in millimetres.
     pub error_mm: Option<f64>,
     /// Angle error of the last detection, in degrees.
     pub error_deg: Option<f64>,
-    /// Number of looks.
+    /// Number of searched pictures.
     pub looks: Looks,
     pub seconds: f64,
 }
 
 impl AttemptRecord {
-    /// Step name of an attempt in which the simulation failed.
+    /// Name of the step for an attempt in which the simulation failed.
     pub const SIMULATION: &str = "simulation";
-    /// Step name of an attempt without a model.
+    /// Name of the step for an attempt without a model.
     pub const TEACH: &str = "teach";
 
     /// All steps at which an attempt can end, in order.
@@ -64,7 +64,7 @@ impl AttemptRecord {
         [Self::TEACH].into_iter().chain(GraspStep::ALL.map(GraspStep::name)).chain([Self::SIMULATION])
     }
 
-    /// From the result of a rehearsal.
+    /// The record of a rehearsal's attempt.
     pub fn new(RehearsedAttempt { attempt, looks, .. }: &RehearsedAttempt) -> Self {
         Self {
             attempt: attempt.number,
@@ -78,7 +78,7 @@ impl AttemptRecord {
         }
     }
 
-    /// An attempt that failed without the robot.
+    /// The record of an attempt that failed before the robot moved.
     pub fn failed(attempt: usize, step: &str, why: String) -> Self {
         Self {
             attempt,
@@ -92,13 +92,13 @@ impl AttemptRecord {
         }
     }
 
-    /// Whether the part was held and both detections were from a first look: from the look-out pose and from above.
+    /// Whether the part was held, and was found in the first picture both from the look-out pose and from above.
     pub fn is_held_at_first_look(&self) -> bool {
         self.success && self.looks == Looks { from_afar: 1, from_above: 1 }
     }
 }
 
-/// The attempts of a cell so far, in order.
+/// The stored attempts of a cell, in order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptsRecord {
     /// Version of the records: [`Self::VERSION`]. Attempts of another version are made again.
@@ -107,7 +107,7 @@ pub struct AttemptsRecord {
 }
 
 impl AttemptsRecord {
-    /// Current version of an attempt's record, raised when a field is added or removed.
+    /// Current version of the record of an attempt; raised when a field is added or removed.
     pub const VERSION: u32 = 2;
 
     /// Attempts of the current version.
@@ -121,9 +121,9 @@ impl AttemptsRecord {
 pub struct DetectionRecord {
     /// Score of the best detection, accepted or not; zero if there is none.
     pub score: f64,
-    /// Its score by the network.
+    /// The network's score of the best detection.
     pub network_score: f64,
-    /// Agreement of the demonstration there, if it was checked.
+    /// Agreement with the demonstration at the best detection, if it was checked.
     pub agreement: Option<f64>,
     /// Position error of the best detection, in millimetres; `None` without a part or a detection.
     pub error_mm: Option<f64>,
@@ -132,7 +132,7 @@ pub struct DetectionRecord {
 }
 
 impl DetectionRecord {
-    /// From a trial.
+    /// The record of a trial.
     pub fn new(trial: &Trial) -> Self {
         Self {
             score: trial.best_score,
@@ -154,7 +154,7 @@ impl DetectionRecord {
         self.is_accepted().then_some(DetectionError { distance_mm, angle_deg })
     }
 
-    /// Whether the error is small enough.
+    /// Whether the part was detected, with an error within the limits.
     pub fn is_right(&self) -> bool {
         self.error().is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
     }
@@ -163,13 +163,13 @@ impl DetectionRecord {
 /// A picture and the detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PictureRecord {
-    /// Seed of its scene.
+    /// Seed of the scene.
     pub seed: u64,
-    /// Another shipped part in a picture without the taught one.
+    /// Another shipped part, which is in a picture without the taught one.
     pub other_part: Option<String>,
-    /// With the check against the demonstration.
+    /// The detection with the check against the demonstration.
     pub verified: DetectionRecord,
-    /// Without it; `None` for a model that consists only of the demonstration.
+    /// The detection without the check; `None` for a model without a network.
     pub alone: Option<DetectionRecord>,
 }
 
@@ -182,13 +182,13 @@ pub struct LookRecord {
     pub absent: Vec<PictureRecord>,
 }
 
-/// Duration of a detection without other load on the machine.
+/// Duration of detections while the machine has no other load.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SpeedRecord {
     /// Number of cores.
     pub cores: usize,
     /// Seconds per image, with the check against the demonstration.
     pub verified_secs: Vec<f64>,
-    /// Seconds per image without it.
+    /// Seconds per image, without the check.
     pub alone_secs: Vec<f64>,
 }

@@ -5,11 +5,11 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use anyhow::Result;
 
-/// A unit of work and its dependencies.
+/// A unit of work and the units that it depends on.
 #[derive(Debug, Clone)]
 pub struct Task<U> {
     pub unit: U,
-    /// Indices of the tasks that it waits for; all smaller than its own, so that there are no cycles.
+    /// Indices of the tasks that this one waits for; all are smaller than its own, so that there are no cycles.
     pub after: Vec<usize>,
 }
 
@@ -26,13 +26,13 @@ struct State {
     error: Option<anyhow::Error>,
 }
 
-/// Runs tasks on `workers` threads: always the first task that is ready. If `work` breaks, no further task is begun;
-/// its first error also ends the run, and is returned.
+/// Runs tasks on `workers` threads, always the first task that is ready. After `work` breaks, no further task begins;
+/// the first error of `work` also ends the run and is returned.
 ///
-/// Each thread has its own rayon pool of `threads_per_worker`, so that units share the cores evenly.
+/// Each thread has its own rayon pool of `threads_per_worker` threads, so that units divide the cores evenly.
 ///
 /// # Errors
-/// The first error of `work`; the system refuses threads.
+/// The first error of `work`; or the operating system provides no threads.
 ///
 /// # Panics
 /// If a task waits for a later one, or `work` panics.
@@ -42,7 +42,7 @@ pub fn run_all<U: Sync>(
     threads_per_worker: usize,
     work: &(dyn Fn(&U) -> Result<ControlFlow<()>> + Sync),
 ) -> Result<()> {
-    /// As for the main thread.
+    /// As large as the stack of the main thread.
     const STACK_BYTES: usize = 8 << 20;
     for (i, task) in tasks.iter().enumerate() {
         assert!(task.after.iter().all(|&before| before < i), "task {i} waits for a later one");
@@ -79,7 +79,7 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The first task that is ready; waits while running tasks may make one ready.
+    /// The first task that is ready; waits if no task is ready but a running one may make one ready.
     fn take<U>(&self, tasks: &[Task<U>]) -> Option<usize> {
         let mut state = self.lock();
         loop {
@@ -117,7 +117,7 @@ impl Queue {
     }
 }
 
-/// Without it the other workers would wait for a task that never ends.
+/// Stops the queue if a worker panics. Otherwise, the other workers would wait for a task that never ends.
 struct StopOnPanic<'a>(&'a Queue);
 
 impl Drop for StopOnPanic<'_> {

@@ -1,21 +1,21 @@
-//! The settings on which an evaluation's results depend.
+//! The settings that determine the results of an evaluation.
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The settings on which results of the paper's protocol depend, besides models and parts. They are stored in every
-/// file of a [`Store`](super::Store), so that results of different settings are never combined in a table.
+/// The settings that determine the results of the paper's protocol, besides models and parts. They are stored in every
+/// file of a [`Store`](super::Store), so that no table combines results of different settings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Version of the protocol, raised when scenes, seeds or counts change.
+    /// Version of the protocol; raised when scenes, seeds or counts change.
     pub protocol: u32,
     /// Network, training and augmentation.
     pub preset: String,
-    /// Number of optimiser steps, if not the preset's.
+    /// Number of optimiser steps; `None` for the preset's.
     pub steps: Option<u32>,
-    /// Maximum seconds of training; a result then depends on the machine.
+    /// Maximum duration of training, in seconds; a result then depends on the machine.
     pub time_budget: Option<u32>,
     /// Seed of all random choices.
     pub seed: u64,
@@ -25,7 +25,7 @@ pub struct Settings {
     pub views: u32,
     /// Number of pictures without the part for each part.
     pub scenes: u32,
-    /// SHA-256 of the program if many processes share the folder: results of other programs are then rejected.
+    /// SHA-256 of the program, if many processes use the folder: results of other programs are then rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<String>,
 }
@@ -34,7 +34,7 @@ impl Settings {
     /// The current version of the protocol.
     pub const PROTOCOL: u32 = 2;
 
-    /// Settings of preset `edge`, with equal numbers of pictures with and without the part.
+    /// Settings with preset `edge`, and with equal numbers of pictures with and without the part.
     #[cfg(test)]
     pub(super) fn for_test(seed: u64, attempts: u32, pictures: u32) -> Self {
         Self {
@@ -62,27 +62,28 @@ impl Settings {
     }
 }
 
-/// The settings on which a teaching depends, besides model, part and marks: the protocol and the axes share teachings.
+/// The settings that determine a teaching, besides model, part and marks. The protocol and the axes use the same
+/// teachings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeachingSettings {
     /// Network, training and augmentation.
     pub preset: String,
-    /// Number of optimiser steps, if not the preset's.
+    /// Number of optimiser steps; `None` for the preset's.
     pub steps: Option<u32>,
-    /// Maximum seconds of training; a result then depends on the machine.
+    /// Maximum duration of training, in seconds; a result then depends on the machine.
     pub time_budget: Option<u32>,
     /// Seed of all random choices.
     pub seed: u64,
-    /// As in [`Settings`].
+    /// SHA-256 of the program, as in [`Settings`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<String>,
 }
 
-/// The differences between the requested settings and those of a file, in words; `None` if every requested setting
+/// The differences between the requested settings and a file's settings, in words; `None` if every requested setting
 /// equals the file's. Additional settings in the file are ignored.
 ///
 /// # Errors
-/// Settings cannot be serialised as JSON.
+/// The settings cannot be serialised as JSON.
 pub(super) fn difference(expected: &impl Serialize, found: &Value) -> Result<Option<String>> {
     let expected = serde_json::to_value(expected)?;
     let told = |value: &Value| match value {
@@ -130,7 +131,7 @@ mod tests {
             program: None,
         };
         assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 8);
-        // The program is compared only if it is requested.
+        // The program is compared only if requested.
         let of_program = |name: &str| Settings { program: Some(name.into()), ..settings() };
         assert_eq!(told(&of_program("a1"), &of_program("b2")).unwrap(), "program: expected a1, found b2");
         assert_eq!(told(&of_program("a1"), &settings()).unwrap(), "program: expected a1, found none");

@@ -1,18 +1,19 @@
-//! The folder of an evaluation: a file for every finished unit of work.
+//! The folder of an evaluation, with a file for every finished unit of work.
 //!
 //! ```text
 //! DIR/settings.json
 //! DIR/models/C-pendulum.sdg                   the taught network
-//! DIR/cells/C-pendulum.teaching.json          how its teaching ended
+//! DIR/cells/C-pendulum.teaching.json          result of teaching
 //! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
-//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten as each ends
+//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten after each
 //! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
 //! DIR/axes/C-pendulum.tilt.json               pictures of an axis
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
 //! ```
 //!
 //! Each JSON file contains the settings with which it was made, and is written atomically. A teaching contains only the
-//! settings of teachings, so that the protocol and the axes share it, for any number of attempts or pictures.
+//! settings of teachings, so that the protocol and the axes use the same teachings for any number of attempts or
+//! pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,16 +30,16 @@ use crate::error::EvaluationError;
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// An evaluation's folder, locked by this process.
+/// The folder of an evaluation, locked by this process.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     settings: Settings,
-    /// Held while the store exists.
+    /// Locked while the store exists.
     _lock: Lock,
 }
 
-/// A file of the store.
+/// The contents of a file in the store.
 #[derive(Serialize, Deserialize)]
 struct Stored<S, T> {
     settings: S,
@@ -49,15 +50,15 @@ impl Store {
     /// Opens or creates the folder of an evaluation.
     ///
     /// # Errors
-    /// The folder cannot be written, is used by another process, or has models taught with other settings.
+    /// The folder cannot be written, is used by another process, or has models that were taught with other settings.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
         Self::open_with(folder, settings, Access::Alone)
     }
 
-    /// The same for one of several processes, which divide the units among themselves by other means.
+    /// Like [`Self::open`], for one of several processes, which divide the units among themselves by other means.
     ///
     /// # Errors
-    /// As [`Self::open`], if a process has exclusive use of the folder.
+    /// The errors of [`Self::open`], the last one if a process has the folder exclusively.
     pub fn open_shared(folder: &Path, settings: &Settings) -> Result<Self> {
         Self::open_with(folder, settings, Access::Shared)
     }
@@ -84,12 +85,12 @@ impl Store {
         &self.folder
     }
 
-    /// The settings of the paper's protocol's results.
+    /// The settings of the results of the paper's protocol.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// A record of the paper's protocol, if available. `name` is the name of its file.
+    /// A stored record of the paper's protocol. `name` is the name of its file.
     ///
     /// # Errors
     /// The file cannot be read, is damaged, or was made with other settings.
@@ -97,10 +98,10 @@ impl Store {
         self.read_made_with(name, &self.settings)
     }
 
-    /// A record that depends on `settings`, if available.
+    /// A stored record that depends on `settings`.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// The errors of [`Self::read`].
     pub fn read_made_with<T: DeserializeOwned>(&self, name: &str, settings: &impl Serialize) -> Result<Option<T>> {
         let path = self.folder.join(name);
         let Some((made_with, record)) = read_stored(&path)? else { return Ok(None) };
@@ -128,12 +129,12 @@ impl Store {
         Ok(write_atomically(&self.folder.join(name), bytes)?)
     }
 
-    /// Path of a file in the folder.
+    /// The path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Removes an obsolete file; a missing one is not an error.
+    /// Removes an obsolete file, if it exists.
     pub fn remove(&self, name: &str) -> Result<()> {
         let path = self.folder.join(name);
         match fs::remove_file(&path) {
@@ -145,7 +146,7 @@ impl Store {
     }
 }
 
-/// The settings and the record in any store's file; `None` if there is no such file.
+/// The settings and the record in a file of any store; `None` if there is no such file.
 ///
 /// # Errors
 /// The file cannot be read or is damaged.
@@ -189,7 +190,7 @@ mod tests {
         drop(Store::open(folder.path(), &settings(1)).unwrap());
         let refused = one_line(&Store::open(folder.path(), &settings(2)).unwrap_err());
         assert!(refused.contains("settings.json: made with other settings (seed: expected 2, found 1)"), "{refused}");
-        // The same for a file copied from another evaluation.
+        // A file copied from another evaluation has other settings as well.
         let elsewhere = tempfile::tempdir().unwrap();
         Store::open(elsewhere.path(), &settings(3)).unwrap().write("cells/a.json", &7u32).unwrap();
         fs::copy(elsewhere.path().join("cells/a.json"), folder.path().join("cells/a.json")).unwrap();

@@ -1,4 +1,4 @@
-//! Sums of the store's records, by cell and by model.
+//! Sums of the records in the store, by cell and by model.
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,7 @@ use super::store::Store;
 use super::units::Evaluation;
 use crate::statistics::{Share, wilson_interval};
 
-/// All results of a group of parts. Remaining units are missing in the sums; `remaining` is their number, for all
-/// groups.
+/// All results of a group of parts. The sums lack the remaining units; `remaining` is their number for all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub group: PartGroup,
@@ -26,90 +25,91 @@ pub struct Summary {
     pub remaining: usize,
     /// Whether grasps without the check against the demonstration were requested.
     pub unverified: bool,
-    /// One per model, in the order requested.
+    /// The summary of each model, in the requested order.
     pub models: Vec<ModelSummary>,
-    /// One for each model on each part.
+    /// The summary of each model on each part.
     pub cells: Vec<CellSummary>,
 }
 
-/// A model on all parts.
+/// The results of a model on all parts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
     pub model: ModelKind,
-    /// The model whose network it uses; itself unless it shares one.
+    /// The model whose network is used; the model itself, unless it uses another model's.
     pub network: ModelKind,
-    /// Teachings that gave a model, of all.
+    /// Number of teachings that gave a model, of all teachings.
     pub taught: Share,
-    /// Number of samples for the detector; median over the parts.
+    /// Number of samples for the detector: the median over the parts.
     pub samples: Option<f64>,
-    /// Number of crops for the orientation CNN; `None` for models without one.
+    /// Number of crops for the orientation CNN: the median over the parts; `None` for models without one.
     pub crops: Option<f64>,
-    /// Wall-clock time from photo to model; median over the parts.
+    /// Wall-clock time from photo to model: the median over the parts.
     pub teaching_secs: Option<f64>,
-    /// Maximum over the parts.
+    /// Wall-clock time from photo to model: the maximum over the parts.
     pub longest_teaching_secs: Option<f64>,
     pub largest_bytes: Option<usize>,
-    /// With the check against the demonstration.
+    /// Results with the check against the demonstration.
     pub verified: Figures,
-    /// Without it; `None` for a model that consists only of the demonstration.
+    /// Results without the check; `None` for a model without a network.
     pub alone: Option<Figures>,
 }
 
-/// A model on one part.
+/// The results of a model on one part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CellSummary {
     pub model: ModelKind,
     pub object: String,
-    /// Outcome of its teaching; `None` before its end.
+    /// Outcome of the teaching; `None` if it has not ended.
     pub teaching: Option<TeachingRecord>,
-    /// With the check against the demonstration.
+    /// Results with the check against the demonstration.
     pub verified: Figures,
     pub alone: Option<Figures>,
     /// Failed attempts with the check.
     pub failures: Vec<AttemptRecord>,
-    /// Failed attempts without it.
+    /// Failed attempts without the check.
     pub failures_alone: Vec<AttemptRecord>,
 }
 
 /// Counts and measurements.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Figures {
-    /// Attempts that held the part.
+    /// Attempts that held the part, of all attempts.
     pub held: Share,
-    /// Its 95 % confidence interval (Wilson).
+    /// 95 % confidence interval (Wilson) of `held`.
     pub held_interval: [f64; 2],
-    /// Attempts held with both detections from a first look, of all attempts.
+    /// Attempts that held the part, and found it in the first picture both from the look-out pose and from above; of
+    /// all attempts.
     pub held_at_first_look: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,
-    /// Unseen pictures with the part found within 10 mm and 10°.
+    /// Unseen pictures in which the part was found within 10 mm and 10°, of all with the part.
     pub right: Share,
-    /// Median of the detections' position errors, in millimetres.
+    /// Median of the position errors of detections, in millimetres.
     pub median_mm: Option<f64>,
-    /// 90th percentile.
+    /// 90th percentile of the position errors, in millimetres.
     pub p90_mm: Option<f64>,
-    /// Median of their angle errors, in degrees, modulo the part's symmetry.
+    /// Median of the angle errors of detections, in degrees, modulo the part's symmetry.
     pub median_deg: Option<f64>,
-    /// 90th percentile.
+    /// 90th percentile of the angle errors, in degrees.
     pub p90_deg: Option<f64>,
-    /// Pictures without the part in which something was accepted.
+    /// Pictures without the part in which a detection was accepted, of all without the part.
     pub false_alarms: Share,
-    /// Images per second without other load on the machine.
+    /// Images per second while the machine has no other load.
     pub frames_per_second: Option<f64>,
 }
 
 impl Figures {
-    /// Attempts held after at least one further look, of all attempts.
+    /// Attempts that held the part after at least one further picture, of all attempts.
     pub fn held_after_further_looks(&self) -> Share {
         Share { count: self.held.count - self.held_at_first_look.count, of: self.held.of }
     }
 }
 
-/// The records behind a row of figures.
+/// The records that are summed in a row.
 #[derive(Default)]
 struct Gathered {
     attempts: Vec<AttemptRecord>,
-    /// `None` if there was no model.
+    /// The detections in pictures with the part; `None` if there was no model.
     present: Vec<Option<DetectionRecord>>,
     absent: Vec<DetectionRecord>,
     secs: Vec<f64>,
@@ -153,7 +153,7 @@ impl Gathered {
 }
 
 impl Summary {
-    /// Sums the results in the store, separately for the paper's parts and the held-out ones; groups without parts are
+    /// Sums the results in the store, separately for the paper's parts and the held-out parts; groups without parts are
     /// missing.
     ///
     /// # Errors
@@ -232,7 +232,8 @@ fn model_summary(model: ModelKind, teachings: &[TeachingRecord], [verified, alon
     }
 }
 
-/// Results of a cell in one way. If teaching failed, every attempt counts as failed and every part as missed.
+/// The records of a cell, with the check or without. If the teaching failed, every attempt counts as failed and every
+/// part as missed.
 fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store) -> Result<Gathered> {
     let settings = store.settings();
     let attempts = if attempted { settings.attempts as usize } else { 0 };
@@ -336,11 +337,11 @@ mod tests {
         assert_eq!((model.taught.to_string().as_str(), model.network), ("1 of 2", ModelKind::C));
         assert_eq!(model.verified.held, Share { count: 2, of: 6 });
         assert_eq!(model.verified.failures_by_step, BTreeMap::from([("lift".into(), 1), ("teach".into(), 3)]));
-        // One picture right, one 30 mm off, two of the part that could not be taught.
+        // One picture is right, one is 30 mm off, and two are of the part that could not be taught.
         assert_eq!(model.verified.right, Share { count: 1, of: 4 });
         assert_eq!(model.verified.median_mm, Some(15.5));
         assert_eq!(model.verified.false_alarms, Share { count: 0, of: 2 });
-        // Without the check, the first is refused, so only the second's error counts.
+        // Without the check, the first detection is refused, so only the error of the second counts.
         let alone = model.alone.as_ref().unwrap();
         assert_eq!((alone.right, alone.median_deg), (Share { count: 1, of: 4 }, Some(9.0)));
         assert_eq!(alone.false_alarms, Share { count: 1, of: 2 });

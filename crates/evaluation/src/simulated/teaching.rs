@@ -20,21 +20,21 @@ use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::shipped;
 
-/// Settings for teaching networks.
+/// The settings for teaching networks.
 pub(super) struct Teaching<'a> {
     /// The store for the networks.
     pub store: &'a Store,
-    /// Network, training and augmentation, as named in the store's settings.
+    /// Network, training and augmentation, as named in the settings of the store.
     pub preset: Preset,
     /// Number of units that run in parallel.
     pub jobs: usize,
 }
 
 impl Teaching<'_> {
-    /// Teaches a cell's network and stores it; returns the result in words, `None` if interrupted.
+    /// Teaches a cell's network and stores it. Returns the result in words, or `None` if interrupted.
     ///
     /// # Errors
-    /// Files cannot be written. A teaching without a model is a result.
+    /// Files cannot be written. A teaching without a model is not an error.
     pub(super) fn teach(
         &self,
         cell: Cell,
@@ -61,7 +61,7 @@ impl Teaching<'_> {
         options.steps = settings.steps.map(|steps| steps as usize);
         options.time_budget = settings.time_budget.map(|secs| Duration::from_secs(secs.into()));
         options.lengths = lengths;
-        // An interrupted teaching keeps the best network so far, which would differ from that of an uninterrupted run.
+        // An interrupted teaching keeps the best network so far, which differs from the result of an uninterrupted one.
         let mut interrupted = false;
         let mut observe = |_: &TeachingEvent| {
             interrupted |= is_interrupted();
@@ -74,11 +74,11 @@ impl Teaching<'_> {
         let (record, summary) = match taught {
             Ok(taught) => {
                 let bytes = taught.model.to_bytes()?;
-                // The record is written last: it states that the model is complete.
+                // The record is written last, because it states that the model is complete.
                 self.store.write_bytes(&cell.model_file(marks), &bytes)?;
                 let facts = taught.model.facts().clone();
                 let summary = facts.validation.map_or("nothing to train".to_owned(), |validation| {
-                    format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
+                    format!("finds the part in {:.0} % of held-out samples", 100.0 * validation.hit_rate)
                 });
                 let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
                 (
@@ -106,7 +106,7 @@ fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstr
     Ok((seen.remove(0), lengths))
 }
 
-/// The loss curve of a teaching, reduced for storage.
+/// The losses of a teaching, averaged over groups of steps for storage.
 fn mean_losses(history: &History) -> Vec<f64> {
     let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
     history.steps.chunks(LOSS_STEPS).map(mean).collect()

@@ -1,4 +1,4 @@
-//! The work units of the protocol and their dependencies. `work.rs` runs them.
+//! The work units of the protocol, with their dependencies. `work.rs` runs them.
 
 use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
@@ -8,14 +8,14 @@ use super::cell::{Cell, Marks};
 use super::schedule::Task;
 use super::store::Store;
 
-/// A piece of work that is stored or lost as a whole.
+/// A piece of work that is stored completely or not at all.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.
     Teach(Cell<'a>),
-    /// All models search a part's pictures: each picture is rendered once.
+    /// All models search a part's pictures; each picture is rendered once.
     Look(&'a ObjectSpec),
-    /// A model grasps a part; stored attempt by attempt.
+    /// A model grasps a part; each attempt is stored on its own.
     Attempts(Cell<'a>, &'a ObjectSpec, Verification),
 }
 
@@ -23,7 +23,7 @@ pub(super) enum Unit<'a> {
 pub struct Evaluation<'a> {
     pub models: &'a [ModelKind],
     pub objects: &'a [ObjectSpec],
-    /// Network, training and augmentation, as named in the store's settings.
+    /// Network, training and augmentation, as named in the settings of the store.
     pub preset: Preset,
     pub store: &'a Store,
     /// Whether every grasp is also tried without the check against the demonstration.
@@ -38,7 +38,7 @@ impl Evaluation<'_> {
         Ok(self.tasks()?.len() + self.without_speed()?.len())
     }
 
-    /// With the check against the demonstration; and without it if requested.
+    /// The verifications to measure: with the check against the demonstration, and without it if requested.
     fn ways(&self, model: ModelKind) -> impl Iterator<Item = Verification> {
         let alone = self.unverified && model.has_network();
         std::iter::once(Verification::ByShape).chain(alone.then_some(Verification::Off))
@@ -48,7 +48,7 @@ impl Evaluation<'_> {
         self.models.iter().map(|&model| Cell { model, object: &object.name })
     }
 
-    /// The remaining units, part by part, so that an interrupted evaluation has results of complete parts. Attempts
+    /// The remaining units, part by part, so that an interrupted evaluation has results for complete parts. Attempts
     /// without the check come last.
     pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let (store, mut tasks, mut last) = (self.store, Vec::<Task<Unit>>::new(), Vec::new());
@@ -90,7 +90,7 @@ impl Evaluation<'_> {
         Ok(tasks)
     }
 
-    /// False once its teaching has failed: no work is left for it.
+    /// Whether work is left for a cell: not after its teaching has failed.
     fn is_usable(&self, cell: Cell) -> Result<bool> {
         Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }
@@ -156,7 +156,7 @@ mod tests {
             ]
         );
 
-        // Finished units are not done again; a part whose teaching failed needs no more work.
+        // Finished units are not done again, and a part whose teaching failed needs no further work.
         let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
         store.write("cells/C-pendulum.teaching.json", &failed).unwrap();
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());

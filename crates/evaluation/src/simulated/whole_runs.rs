@@ -1,5 +1,5 @@
-//! A small evaluation, and some small axes of pictures and errors, in the simulator: model S, which is taught at once,
-//! on one part.
+//! A small evaluation, and a few axes and errors, in the simulator with one part and model S, which is taught in a
+//! moment.
 
 use std::fs;
 use std::path::Path;
@@ -38,7 +38,7 @@ fn settings() -> Settings {
     }
 }
 
-/// Opens the folder like a separate process, continues until it is interrupted, and sums the results.
+/// Opens the folder like a separate process, continues until interrupted, and sums the results.
 fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
     let store = Store::open(folder, &settings()).unwrap();
     let evaluation = Evaluation {
@@ -58,7 +58,7 @@ fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
     summary
 }
 
-/// Without values that differ between runs.
+/// Removes the values that differ between runs.
 fn timeless(mut summary: Summary) -> Summary {
     for model in &mut summary.models {
         (model.teaching_secs, model.longest_teaching_secs) = (None, None);
@@ -83,7 +83,7 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
     assert_eq!((model.taught.count, model.verified.held.of, model.verified.right.of), (1, 2, 2));
     assert_eq!(model.verified.false_alarms.of, 2);
     assert!(model.alone.is_none() && model.verified.frames_per_second.unwrap() > 0.0);
-    // A broken search or robot shows here.
+    // A defect of the search or the robot would be visible here.
     assert!(model.verified.held.count > 0 && model.verified.right.count > 0, "{model:?}");
     assert_eq!(model.verified.false_alarms.count, 0);
 
@@ -99,15 +99,15 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
 
     let resumed = go_on(broken.path(), &|| false);
     assert_eq!(timeless(resumed.clone()), timeless(whole));
-    // Existing results were kept, with their times: nothing was done twice.
+    // Existing results were kept, with their times, so no unit was done twice.
     let record: serde_json::Value = serde_json::from_slice(&read(ATTEMPTS)).unwrap();
     assert_eq!(&record["record"]["attempts"][0], first_attempt);
     assert_eq!(read(MODEL), model_file);
-    // A further run has nothing to do, and every number is unchanged.
-    assert_eq!(go_on(broken.path(), &|| panic!("asked of work that there is none of")), resumed);
+    // A further run has no units to do, and all results are unchanged.
+    assert_eq!(go_on(broken.path(), &|| panic!("asked although no work is left")), resumed);
 }
 
-/// Continues with some axes like a separate process, and sums the results.
+/// Continues with some axes, like a separate process, and sums the results.
 fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> bool + Sync)) -> AxesSummary {
     let store = Store::open(folder, &settings()).unwrap();
     let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
@@ -148,7 +148,7 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     let [GroupSummary { axes, look_alikes, grasps, .. }] = &whole.groups[..] else { panic!("{:?}", whole.groups) };
     let found = |axis: &str| axes.iter().find(|figures| figures.axis == axis).unwrap().found;
     assert_eq!((found("tilt").of, found("instances").of), (2, 6));
-    // The two mildest pictures of the tilt, and orange pendulums three times on a table.
+    // The two pictures with the smallest tilt, and three orange pendulums on a table.
     assert!(found("tilt").count > 0 && found("instances").count >= 3, "{axes:?}");
     assert!(axes.iter().all(|figures| figures.way == Way::WithCheck), "S has no network");
     assert_eq!(
@@ -157,8 +157,8 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     );
     assert_eq!((grasps[0].condition, grasps[0].held.of), (GraspCondition::MarkHeight, 2));
     assert!(whole.seconds.pictures > 0.0 && whole.seconds.grasps > 0.0);
-    // A further run has nothing to do.
-    assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked of work that there is none of")), whole);
+    // A further run has no units to do.
+    assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked although no work is left")), whole);
 }
 
 /// Continues with some sets of the cameras' pictures, and sums the results.
@@ -196,6 +196,6 @@ fn interrupted_cameras_go_on_and_are_exact() {
     assert_eq!((of("other-sizes").accepted, of("other-sizes").found.of), (Share { count: 0, of: 2 }, 0));
     assert!(cameras::page(&whole, &[], "sdg evaluate --cameras").to_html().is_ok());
     // Finished units are not done again.
-    let again = go_on_with_cameras(folder.path(), &|| panic!("asked of work that there is none of"));
+    let again = go_on_with_cameras(folder.path(), &|| panic!("asked although no work is left"));
     assert_eq!(again.sets, whole.sets);
 }

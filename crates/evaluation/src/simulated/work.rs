@@ -23,10 +23,10 @@ use crate::trial::try_view;
 const SPEED_VIEWS: usize = 3;
 
 impl Evaluation<'_> {
-    /// Runs the remaining units; breaks if `is_interrupted` returns true, and keeps all finished units.
+    /// Runs the remaining units until `is_interrupted` returns true, and keeps all finished units.
     ///
     /// # Errors
-    /// Files cannot be read or written, or the simulator fails. A failed teaching is a result.
+    /// Files cannot be read or written, or the simulator fails. A failed teaching is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<ControlFlow<()>> {
         let tasks = self.tasks()?;
         let without_speed = self.without_speed()?;
@@ -58,7 +58,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Runs all models that have not been run yet on the same pictures of a part.
+    /// Runs all models that have not been run yet on a part's pictures, which are the same for every model.
     fn look(&self, object: &ObjectSpec, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
         let settings = self.store.settings();
         let mut looks = Vec::new();
@@ -101,7 +101,7 @@ impl Evaluation<'_> {
             self.store.write(&cell.file("look"), &record)?;
             let right = record.present.iter().filter(|p| p.verified.is_right()).count();
             let false_alarms = record.absent.iter().filter(|p| p.verified.is_accepted()).count();
-            summary.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
+            summary.push(format!("{}: {right} correct, {false_alarms} false alarms", cell.model));
         }
         Ok(Some(if summary.is_empty() { NO_MODEL.to_owned() } else { summary.join("; ") }))
     }
@@ -131,7 +131,7 @@ impl Evaluation<'_> {
         Ok(attempts.map(|attempts| held_of(&attempts)))
     }
 
-    /// Measures the time of detections on all cores, without other work of this process.
+    /// Measures the duration of detections on all cores, without other work in this process.
     pub(super) fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
         let seed = picture_seed(self.store.settings().seed, object, 0);
         let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
@@ -141,7 +141,7 @@ impl Evaluation<'_> {
             }
             let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { continue };
             let timed = |verification: Verification| -> Result<Vec<f64>> {
-                // The first detection packs weights and fills caches.
+                // The first detection takes longer, because it packs weights and fills caches.
                 model.detect(&pictures[0].view.image, verification)?;
                 pictures.iter().map(|seen| Ok(try_view(&model, object, seen, verification)?.seconds)).collect()
             };

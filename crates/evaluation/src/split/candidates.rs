@@ -1,4 +1,4 @@
-//! Every candidate with its class by the ground truth, as JSON lines, for the analysis of acceptance.
+//! Every candidate and its class by the ground truth, as JSON lines, for studying the acceptance of detections.
 
 use anyhow::Result;
 use sdg_grasp::{DetectionRecord, GraspDetection, ModelKind};
@@ -8,26 +8,26 @@ use super::file::Side;
 use super::run::{Measured, SetRun, kind_of};
 use crate::labelled_pictures::{HitError, Tested, judge};
 
-/// Maximum distance of a candidate from an instance on which it is, in diagonals of the instance. Chosen by hand: no
-/// part extends farther from the middle of its grasp than a diagonal, and few extend half as far.
+/// Maximum distance of a candidate from an instance to be on it, in diagonals of the instance. Chosen by hand: no part
+/// extends farther from the centre of its grasp than a diagonal, and few extend half as far.
 const MAX_ON_PART_DIAGONALS: f64 = 0.5;
 
-/// The class of a candidate relative to the nearest instance, optional or not, whether or not another candidate hits it
-/// too.
+/// The class of a candidate relative to the nearest instance. The instance may be optional, and may also be hit by
+/// another candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Place {
     /// Within the distance and the angle of a hit.
     Right,
-    /// Within the distance of a hit, but turned.
+    /// Within the distance of a hit, but not within the angle.
     WrongTurn,
     /// On the part, but not within the distance of a hit.
     Misplaced,
-    /// Elsewhere.
+    /// Not on the part.
     Wrong,
 }
 
-/// The instance that a candidate takes from later ones.
+/// The instance that a candidate takes, so that later ones cannot take it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Hit {
@@ -45,9 +45,9 @@ struct Candidate<'a> {
     image: String,
     kind: &'a str,
     place: Place,
-    /// Matched one to one, best score first; null for a second candidate on an instance.
+    /// The hit, matched one to one in order of decreasing score; null for a second candidate on the same instance.
     hit: Option<Hit>,
-    /// Distance from the nearest instance, in percent of its diagonal; null in pictures without one.
+    /// Distance from the nearest instance, in percent of its diagonal; null in pictures without an instance.
     distance_percent: Option<f64>,
     turn_deg: Option<f64>,
     #[serde(flatten)]
@@ -57,7 +57,7 @@ struct Candidate<'a> {
 /// The lines of all candidates of a model.
 ///
 /// # Errors
-/// None in practice: every record can be serialised.
+/// No error occurs in practice: every record can be serialised.
 pub fn candidates(measured: &Measured) -> Result<String> {
     let mut lines = String::new();
     for run in &measured.runs {
@@ -71,7 +71,7 @@ pub fn candidates(measured: &Measured) -> Result<String> {
 }
 
 fn of_picture<'a>(model: ModelKind, run: &'a SetRun, tested: &'a Tested) -> impl Iterator<Item = Candidate<'a>> {
-    // From a score of 0 on: a lower limit only makes the list longer.
+    // All candidates count: with a lower limit, the list of hits only becomes longer.
     let hits = judge(tested, 0.0).hits;
     tested.detections.iter().zip(hits).map(move |(detection, hit)| {
         let nearest = nearest(tested, detection);

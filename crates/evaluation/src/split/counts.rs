@@ -1,25 +1,25 @@
-//! The three figures of a set, a kind of picture or a side.
+//! The three figures of a set, of a kind of picture, or of a side.
 
 use serde::Serialize;
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Judged, Tested, Totals, judge};
 use crate::statistics::Share;
 
-/// Found, wrong and false alarms at the minimum score of `sdg detect`.
+/// Found, wrong and false alarms, at the minimum score of `sdg detect`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Parts found, of those that must be found.
+    /// Parts found, of all that must be found.
     pub found: Share,
-    /// Detections without a hit, of those accepted in pictures with the part.
+    /// Detections without a hit, of all accepted in pictures with the part.
     pub wrong: Share,
-    /// Pictures without the part in which something is accepted.
+    /// Pictures without the part in which a detection is accepted, of all without the part.
     pub false_alarms: Share,
 }
 
 /// A figure of the counts.
 pub(super) type Figure = fn(&Counts) -> Share;
 
-/// The figures for comparing sides.
+/// The figures by which sides are compared.
 pub(super) const FIGURES: [(&str, Figure); 3] = [
     ("parts found", |counts| counts.found),
     ("wrong, of accepted detections", |counts| counts.wrong),
@@ -38,7 +38,7 @@ impl Counts {
         }
     }
 
-    /// On one line; a dash if nothing was counted.
+    /// The figures on one line; a dash for a total of zero.
     pub fn in_words(&self) -> String {
         let found = format!("{} found, {} wrong", self.found, self.wrong.count);
         let false_alarms = format!("{} false alarms", self.false_alarms);
@@ -47,7 +47,7 @@ impl Counts {
         if told.is_empty() { "–".to_owned() } else { told.join("; ") }
     }
 
-    /// The lower of found and the higher of wrong and false alarms, each separately.
+    /// The lower `found`, the higher `wrong` and the higher `false_alarms`, each on its own.
     pub fn worse_of(self, other: Self) -> Self {
         let count = |share: &Share| share.count;
         Self {

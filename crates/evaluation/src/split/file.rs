@@ -1,4 +1,4 @@
-//! The split's file: a TOML table for each set.
+//! The split file, with a TOML table for each set.
 
 use std::path::{Path, PathBuf};
 
@@ -6,23 +6,23 @@ use anyhow::{Result, anyhow, bail};
 use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
-/// Maximum size of a split's file.
+/// Maximum size of a split file.
 const MAX_SPLIT_BYTES: u64 = 1 << 20;
 
-/// The permitted use of a set's results.
+/// The side of a set, which states how its results may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// Constants may be fitted on it.
+    /// Constants may be fitted on the set.
     Tuned,
-    /// Its results were known when earlier constants were chosen; it may no longer be used for fitting.
+    /// The results were known when earlier constants were chosen; the set may no longer be used for fitting.
     Used,
-    /// It is reported, and no constant is fitted on it.
+    /// The set is reported, and no constant is fitted on it.
     Reported,
 }
 
 impl Side {
-    /// Every side, in the order of tables.
+    /// Every side, in the order of the tables.
     pub const ALL: [Self; 3] = [Self::Tuned, Self::Used, Self::Reported];
 
     /// The name in the file and in tables.
@@ -41,11 +41,11 @@ impl Side {
 pub struct SplitSet {
     pub name: String,
     pub side: Side,
-    /// Its folder, relative to that of `--sets`.
+    /// The folder of the set, relative to that of `--sets`.
     pub folder: PathBuf,
-    /// The photo in it for teaching, with marks beside it.
+    /// The name of the photo for teaching, which has marks beside it.
     pub demo: String,
-    /// The part's equivalent turns.
+    /// The equivalent rotations of the part.
     #[serde(default)]
     pub symmetry: RotationalSymmetry,
 }
@@ -56,11 +56,11 @@ struct SplitFile {
     set: Vec<SplitSet>,
 }
 
-/// Reads the sets of a split's file.
+/// Reads the sets of a split file.
 ///
 /// # Errors
-/// The file cannot be read, has an unknown side or field, two sets with one name, or a symmetry of fewer than two
-/// turns.
+/// The file cannot be read, has an unknown side or field, two sets of the same name, or a symmetry with a fold below
+/// two.
 pub fn read_split(path: &Path) -> Result<Vec<SplitSet>> {
     let bytes = sdg_files::read(path, MAX_SPLIT_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|error| anyhow!("{}: expected UTF-8: {error}", path.display()))?;

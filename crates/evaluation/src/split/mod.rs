@@ -1,14 +1,15 @@
-//! A split of test sets into those on which constants may be fitted and those that are only reported, all measured in
+//! A split of test sets into sets on which constants may be fitted and sets that are only reported. All are measured in
 //! the same way.
 //!
 //! ```text
-//! split file ─ SplitSet ─ ReadySet: demonstration, truth ─ teach, detect ─ SetRun ─ Measured: of one model, all seeds
-//!                                                                                      │
-//!                                                    tables, JSON, a line a candidate ─┘
+//! split file ─ SplitSet ─ ReadySet: demonstration, ground truth ─ teach, detect ─ SetRun ─ Measured: one model, all seeds
+//!                                                                                             │
+//!                                                       tables, JSON, one line per candidate ─┘
 //! ```
 //!
-//! A **side** is one of tuned, used and reported. **Wrong** is the share of detections without a hit among those
-//! accepted in pictures with the part; a **false alarm** is a picture without the part in which something is accepted.
+//! A **side** is one of tuned, used and reported. **Wrong** is the fraction of detections without a hit among all
+//! accepted in pictures with the part. A **false alarm** is a picture without the part in which a detection is
+//! accepted.
 
 mod candidates;
 mod counts;

@@ -1,4 +1,4 @@
-//! Teaches a set from its demonstration, and runs the model on its pictures.
+//! Teaches a model from the demonstration of a set, and runs it on the set's pictures.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use super::file::SplitSet;
 use crate::labelled_pictures::{LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
 use crate::taught_file::TaughtFile;
 
-/// A set whose files were found.
+/// A set whose files were read and checked.
 pub struct ReadySet {
     pub set: SplitSet,
     folder: PathBuf,
@@ -26,26 +26,26 @@ pub struct ReadySet {
 pub struct SetRun {
     pub set: SplitSet,
     pub seed: u64,
-    /// Duration of the teaching.
+    /// Duration of the teaching, in seconds.
     pub teach_secs: f64,
     pub tested: Vec<Tested>,
 }
 
-/// A model on all sets, with every seed.
+/// The results of a model on all sets, with every seed.
 pub struct Measured {
     pub model: ModelKind,
     pub seeds: Vec<u64>,
     pub runs: Vec<SetRun>,
 }
 
-/// The kind of a picture: from the labels or, if they name none, whether the part is in it.
+/// The kind of a picture: the one in the labels, or else whether the part is in it.
 pub(super) fn kind_of(tested: &Tested) -> &str {
     let unnamed = if tested.truths.is_empty() { "without part" } else { "with part" };
     tested.picture.kind.as_deref().unwrap_or(unnamed)
 }
 
 impl ReadySet {
-    /// Reads and checks the files of a set, before any time is spent on teaching.
+    /// Reads and checks the files of a set, before the teaching, which takes long.
     ///
     /// # Errors
     /// The folder does not exist, or the demonstration or the `truth.json` is invalid.
@@ -62,17 +62,17 @@ impl ReadySet {
         Ok(Self { set, folder, demonstration })
     }
 
-    /// Its folder.
+    /// The folder of the set.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The photo and its marks.
+    /// The photo and the marks for teaching.
     pub fn demonstration(&self) -> &Demonstration {
         &self.demonstration
     }
 
-    /// Teaches a model with the defaults of `sdg teach`, and runs it on the set's pictures like `sdg detect`.
+    /// Teaches a model with the defaults of `sdg teach`, and runs it on the set's pictures as `sdg detect` does.
     ///
     /// # Errors
     /// Teaching or detection fails; pictures or labels cannot be read.
@@ -101,7 +101,7 @@ impl SetRun {
 }
 
 impl Measured {
-    /// The worst figures of all seeds, each separately, on the pictures selected by the filter.
+    /// The worst figures of all seeds, each figure on its own, for the pictures that `takes` selects.
     pub fn worst(&self, takes: impl Fn(&SetRun, &Tested) -> bool) -> Counts {
         let of_seed = |seed: &u64| {
             let runs = self.runs.iter().filter(|run| run.seed == *seed);

@@ -8,8 +8,8 @@ use super::run::{Measured, SetRun};
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Tested, by_kind_json, by_min_score};
 use crate::statistics::{newcombe_interval, wilson_interval};
 
-/// A model as one object: each seed with its sets and sides, the worst of all seeds, and the difference of tuned and
-/// reported.
+/// The results of a model as one object: each seed with its sets and sides, the worst of all seeds, and the difference
+/// between tuned and reported.
 pub fn summary(measured: &Measured, sides: &[Side]) -> Value {
     let worst = |side: Side| measured.worst(|run, _| run.set.side == side);
     let of_seed = |seed: &u64| {

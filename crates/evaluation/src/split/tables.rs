@@ -1,4 +1,4 @@
-//! The figures as tables in Markdown: sets, kinds of pictures, and the sides.
+//! The figures as Markdown tables: sets, kinds of pictures, and sides.
 
 use sdg_report::{Cell, Column, Table};
 
@@ -18,15 +18,15 @@ fn kinds(measured: &Measured) -> Vec<&str> {
     kinds
 }
 
-/// All tables of a model; with several seeds, the worst of each figure.
+/// All tables of a model. With several seeds, each figure is the worst one.
 pub fn tables(measured: &Measured, sides: &[Side]) -> String {
     let seeds: Vec<String> = measured.seeds.iter().map(u64::to_string).collect();
     let seeds = match seeds.as_slice() {
         [seed] => format!("seed {seed}"),
-        seeds => format!("the worst of seeds {}, each figure by itself", seeds.join(", ")),
+        seeds => format!("the worst of seeds {}, each figure separately", seeds.join(", ")),
     };
     let speed =
-        measured.pictures_per_second().map_or_else(String::new, |speed| format!("; {speed:.1} pictures a second"));
+        measured.pictures_per_second().map_or_else(String::new, |speed| format!("; {speed:.1} pictures per second"));
     let [sets, kinds, totals] =
         [of_sets(measured), of_kinds(measured, sides), of_sides(measured, sides)].map(|table| table.to_markdown());
     format!("model {}, {seeds}{speed}\n\n{sets}\n{kinds}\n{totals}", measured.model)
@@ -65,7 +65,8 @@ fn of_kinds(measured: &Measured, sides: &[Side]) -> Table {
     table
 }
 
-/// Each side with Wilson's intervals, and if both are measured, the difference of tuned and reported with Newcombe's.
+/// Each side with Wilson's intervals; and, if both are measured, the difference between tuned and reported with
+/// Newcombe's.
 fn of_sides(measured: &Measured, sides: &[Side]) -> Table {
     let has_both = [Side::Tuned, Side::Reported].iter().all(|side| sides.contains(side));
     let mut table = with_sides("95 % intervals", sides, has_both.then_some("tuned − reported"));
@@ -91,7 +92,7 @@ fn with_interval(share: Share) -> String {
     share.percent().map_or("–".to_owned(), |percent| format!("{share}: {percent:.1} % ({low:.1} to {high:.1})"))
 }
 
-/// In percentage points; significant if the interval does not contain zero.
+/// The difference in percentage points; it is significant if the interval does not contain zero.
 fn difference(tuned: Share, reported: Share) -> String {
     let (Some(one), Some(other)) = (tuned.percent(), reported.percent()) else { return "–".to_owned() };
     let [low, high] = newcombe_interval(tuned, reported);

@@ -5,8 +5,8 @@
 //! x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²)
 //! y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2 y²) + 2 p2 x y
 //! ```
-//! A polynomial fitted to a picture decreases again somewhere outside it: beyond that radius, points far to the side
-//! would appear in the picture again. They are treated as not visible.
+//! Outside the calibrated picture, the fitted polynomial decreases again at some radius: it would map points beyond
+//! that radius back into the picture. Such points are treated as not visible.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -14,21 +14,21 @@ use serde::{Deserialize, Serialize};
 /// The coefficients; all 0 for no distortion.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlumbBob {
-    /// Radial, of `r²`.
+    /// Radial coefficient of `r²`.
     pub k1: f64,
-    /// Radial, of `r⁴`.
+    /// Radial coefficient of `r⁴`.
     pub k2: f64,
-    /// Tangential.
+    /// Tangential coefficient.
     pub p1: f64,
-    /// Tangential.
+    /// Tangential coefficient.
     pub p2: f64,
-    /// Radial, of `r⁶`.
+    /// Radial coefficient of `r⁶`.
     pub k3: f64,
 }
 
-/// Maximum steps of Newton's method, of which five suffice for existing lenses.
+/// Maximum number of steps of Newton's method. Five suffice for existing lenses.
 const MAX_STEPS: usize = 30;
-/// Its tolerance, at depth 1: a millionth of a pixel.
+/// Tolerance of Newton's method, at depth 1: about a millionth of a pixel.
 const TOLERANCE: f64 = 1e-10;
 
 impl PlumbBob {
@@ -45,8 +45,8 @@ impl PlumbBob {
         [self.k1, self.k2, self.p1, self.p2, self.k3]
     }
 
-    /// The position of a point at depth 1 through the lens; `None` beyond the radius at which the polynomial turns
-    /// back.
+    /// The position of a point at depth 1 through the lens; `None` beyond the radius at which the polynomial decreases
+    /// again.
     pub fn distort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.grows_up_to(point.coords.norm_squared()).then(|| self.polynomial(point))
     }
@@ -63,14 +63,14 @@ impl PlumbBob {
                 return self.grows_up_to(found.coords.norm_squared()).then_some(found);
             }
             let step = self.jacobian(&found).try_inverse()? * off;
-            // A step as long as the picture is wide leads beyond the turning point.
+            // A longer step would lead beyond the radius at which the polynomial decreases again.
             found += step * (1.0 / step.norm()).min(1.0);
         }
         None
     }
 
-    /// The polynomial's value at a point at depth 1, also beyond the radius at which it turns back: for optimisers,
-    /// which must be able to return from there.
+    /// The polynomial's value at a point at depth 1, also beyond the radius at which it decreases again: an optimiser
+    /// must be able to return from there.
     pub fn polynomial(&self, point: &Point2<f64>) -> Point2<f64> {
         let Self { p1, p2, .. } = *self;
         let (x, y, r2) = (point.x, point.y, point.coords.norm_squared());
@@ -103,7 +103,7 @@ impl PlumbBob {
 
     /// Whether the distorted radius increases with the radius, from the centre up to the root of `r2`.
     fn grows_up_to(&self, r2: f64) -> bool {
-        // d(r radial)/dr, and where its own derivative by r² vanishes: 3 k1 + 10 k2 r² + 21 k3 r⁴ = 0.
+        // d(r radial)/dr is smallest where its derivative by r² is zero: 3 k1 + 10 k2 r² + 21 k3 r⁴ = 0.
         let growth = |t: f64| 1.0 + t * (3.0 * self.k1 + t * (5.0 * self.k2 + t * 7.0 * self.k3));
         let (a, b, c) = (21.0 * self.k3, 10.0 * self.k2, 3.0 * self.k1);
         let root = (b * b - 4.0 * a * c).sqrt();
@@ -124,10 +124,10 @@ mod tests {
         assert!(lens.distort(&Point2::new(0.9, 0.0)).is_some());
         assert_eq!(lens.distort(&Point2::new(0.92, 0.0)), None);
         assert_eq!(lens.distort(&Point2::new(1.5, 0.0)), None);
-        // 0.6086 is the largest radius that it shows.
+        // 0.6086 is the largest radius in the distorted picture.
         assert!(lens.undistort(&Point2::new(0.6, 0.0)).is_some());
         assert_eq!(lens.undistort(&Point2::new(0.7, 0.0)), None);
-        // It turns back between 0.84 and 1.6 and then increases again: two roots inside.
+        // The distorted radius decreases between 0.84 and 1.6 and then increases again: its derivative has two roots.
         let lens = PlumbBob { k1: -0.65, k2: 0.15, ..PlumbBob::NONE };
         assert_eq!(lens.distort(&Point2::new(2.5, 0.0)), None);
     }
@@ -140,7 +140,8 @@ mod tests {
         ) {
             let lens = PlumbBob { k1, k2, p1, p2, k3 };
             let point = Point2::new(x, y);
-            // Near the turning point two points are so close together that either may be found.
+            // Near the radius at which the polynomial decreases again, two points are so close together that either may
+            // be found.
             if lens.grows_up_to(1.3 * point.coords.norm_squared()) && lens.jacobian(&point).determinant() > 0.2 {
                 let back = lens.undistort(&lens.distort(&point).unwrap()).unwrap();
                 prop_assert!((back - point).norm() < 1e-8, "{back} {point}");

@@ -1,7 +1,7 @@
-//! Cameras: from a pixel to a point on a plane over the table, and back.
+//! Cameras: from a pixel to a point on a plane above the table, and back.
 //!
 //! ```text
-//! pixel ─ PinholeCamera: lens undone ─ point at depth 1 ─ PosedCamera ─ Ray ─ point on the plane ─ PlanView ─ its pixel
+//! pixel ─ PinholeCamera: distortion removed ─ point at depth 1 ─ PosedCamera ─ Ray ─ point on the plane ─ PlanView ─ its pixel
 //! ```
 
 mod lens;

@@ -39,13 +39,13 @@ impl PinholeCamera {
         Self { width, height, fx, fy, cx, cy, lens: PlumbBob::NONE }.checked()
     }
 
-    /// A camera without distortion, with its axis in the centre of its picture and with square pixels.
+    /// A camera without distortion, with square pixels and the optical axis in the centre of the picture.
     pub fn symmetric(width: u32, height: u32, focal_px: f64) -> Self {
         let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
         Self { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
     }
 
-    /// The same camera, if its values are possible.
+    /// Returns the camera if its values are valid.
     ///
     /// # Errors
     /// A focal length that is not positive and finite, an empty image, or a centre or a coefficient that is not finite.

@@ -1,4 +1,4 @@
-//! A plane over the table, seen vertically from above at a fixed scale.
+//! A horizontal plane at the height of the table or above it, seen vertically from above at a fixed scale.
 //!
 //! ```text
 //! y of the world                     column 0
@@ -7,12 +7,12 @@
 //!   │   └───────────────┘            ↓
 //!   └──────→ x  ↑ left_m             y
 //! ```
-//! The view from above is not mirrored: x goes right with the world's x, y goes down against the world's y. An angle in
-//! the plan view, from x towards y, is therefore minus the same turn about the world's z.
+//! The view from above is not mirrored: x of the view is x of the world, and y of the view points against y of the
+//! world. An angle in the plan view, from x towards y, is therefore minus the same angle about the world's z.
 //!
-//! Only points of the plane are shown at their true position. A point `h` above it, `d` from the point below the
-//! camera, is displaced outwards by `d h / (H − h)`, where `H` is the camera's height over the plane: 8 mm for 30 mm of
-//! height, 150 mm from the point below the camera, from 0.58 m.
+//! Only points of the plane are shown at their true position. Let the camera be at height `H` above the plane, and a
+//! point at height `h` above it, at the horizontal distance `d` from the camera: the point is displaced outwards by `d
+//! h / (H − h)`. With H = 0.58 m, d = 150 mm and h = 30 mm, this is 8 mm.
 
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
@@ -39,13 +39,13 @@ pub struct PlanView {
     pub left_m: f64,
     /// World y of the upper border.
     pub top_m: f64,
-    /// Pixels in a row.
+    /// Width, in pixels.
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
 }
 
-/// The reason why there is no plan view.
+/// The reason why a plan view cannot be made.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanViewError {
@@ -67,7 +67,7 @@ pub enum PlanViewError {
         seen: Workspace,
     },
     /// More pixels than allowed.
-    #[error("expected a plan view of at most {max} pixels, found {found}: bound the workspace")]
+    #[error("expected a plan view of at most {max} pixels, found {found}: give a smaller workspace")]
     TooLarge {
         /// Pixels allowed.
         max: u64,
@@ -76,18 +76,18 @@ pub enum PlanViewError {
     },
 }
 
-/// Steps of the grid at which the picture is evaluated, along each side: fine enough that no corner of the plane is
-/// missed by more than a percent.
+/// Number of intervals along each side of the picture at which the plane is evaluated: fine enough that no corner of
+/// the plane is missed by more than a percent.
 const GRID: u32 = 32;
-/// If a pixel covers more than this many times the best pixel's length, towards the horizon, the picture shows too
-/// little to find parts. Chosen by hand.
+/// Maximum length of a pixel on the plane, as a multiple of the smallest one. Towards the horizon, longer pixels show
+/// too little to find parts. Chosen by hand.
 const MAX_COARSENING: f64 = 4.0;
 
 impl PlanView {
-    /// The part of the plane at `height_m` that `camera` sees, within the workspace.
+    /// The part of the plane at `height_m` that `camera` shows, within the workspace.
     ///
     /// # Errors
-    /// A camera that looks elsewhere, and a view of more than `max_pixels`.
+    /// The camera does not look at the plane or the workspace, or the view would have more than `max_pixels`.
     pub fn of(
         camera: &PosedCamera,
         height_m: f64,
@@ -119,19 +119,19 @@ impl PlanView {
         Point3::new(self.left_m + x, self.top_m - y, self.height_m)
     }
 
-    /// The pixel of a point of the plane; for other points that of the point vertically below or above in the plane.
+    /// The pixel of a point of the plane. Other points are first projected vertically onto the plane.
     pub fn pixel(&self, point: &Point3<f64>) -> Point2<f64> {
         Point2::new(point.x - self.left_m, self.top_m - point.y) * self.pixels_per_m
     }
 
-    /// The position in the camera's own picture of a pixel of the plan view; `None` if the picture does not show it.
+    /// Maps a pixel of the plan view to the camera's picture; `None` if the picture does not show it.
     pub fn in_picture(&self, camera: &PosedCamera, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         let seen = camera.project(&self.point(pixel))?;
         let [width, height] = [camera.intrinsics.width, camera.intrinsics.height].map(f64::from);
         ((0.0..=width).contains(&seen.x) && (0.0..=height).contains(&seen.y)).then_some(seen)
     }
 
-    /// The position in the plan view of a pixel of the camera's own picture; `None` if that does not show the plane.
+    /// Maps a pixel of the camera's picture to the plan view; `None` if the pixel does not show the plane.
     pub fn from_picture(&self, camera: &PosedCamera, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         Some(self.pixel(&camera.at_height(pixel, self.height_m)?))
     }

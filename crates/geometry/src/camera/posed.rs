@@ -7,7 +7,7 @@ use super::pinhole::PinholeCamera;
 /// A half-line in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts, in metres.
+    /// The start, in metres.
     pub origin: Point3<f64>,
     /// Direction, of unit length.
     pub direction: Unit<Vector3<f64>>,
@@ -81,7 +81,7 @@ mod tests {
         let camera = looking_down();
         let seen = camera.project(&Point3::new(0.5, 0.0, 0.0)).unwrap();
         assert!((seen - Point2::new(430.0, 240.0)).norm() < 1e-9);
-        // World y points up in the image: the camera was turned about x.
+        // World y points up in the image: the camera is rotated about x.
         let left_of_robot = camera.project(&Point3::new(0.4, 0.1, 0.0)).unwrap();
         assert!((left_of_robot - Point2::new(320.0, 130.0)).norm() < 1e-9);
     }

@@ -1,9 +1,9 @@
 //! Franka Research 3.
 //!
 //! # Source
-//! Lengths: as the Panda's, see franka_description (commit 566ba44), robots/fr3/kinematics.yaml, which is the same as
+//! Lengths: equal to the Panda's, see franka_description (commit 566ba44), robots/fr3/kinematics.yaml, which equals
 //! robots/fer/kinematics.yaml. Limits: libfranka 0.21, `rate_limiting.h`, whose position-dependent functions also give
-//! the ranges; torques as published by Franka. Shape and masses are the Panda's: they were not measured.
+//! the ranges; torques as published by Franka. Shape and masses are the Panda's; they were not measured on an FR3.
 
 use crate::geometry::ArmGeometry;
 use crate::limits::{CartesianLimits, JointLimits};

@@ -9,18 +9,20 @@ use crate::capsule::Capsule;
 use crate::geometry::{FingerCapsule, FingerGeometry, HandGeometry};
 use crate::inertia::LinkInertia;
 
-/// Flange to tcp along z, m.
+/// Distance from flange to tcp along z, m.
 pub const TCP_OFFSET_M: f64 = 0.1034;
 /// Largest opening between the fingers, m.
 pub const HAND_OPENING_MAX_M: f64 = 0.08;
 /// Half the width of a finger across its motion, m.
 pub const FINGER_HALF_WIDTH_M: f64 = 0.011;
-/// Thickness of a finger along its motion, m: of its tip, and of its root, which starts this far above the tcp.
+/// Thickness of a fingertip along its motion, m.
 const FINGER_THICKNESS_M: f64 = 0.015;
+/// Thickness of a finger's root along its motion, m.
 const FINGER_ROOT_THICKNESS_M: f64 = 0.026;
+/// Height above the tcp at which the root starts, m.
 const FINGER_ROOT_ABOVE_TCP_M: f64 = 0.015;
 
-/// Thickness of a finger along its motion, m, up to a height above the tcp, m.
+/// Maximum thickness of a finger along its motion up to a height above the tcp; both in m.
 pub fn finger_thickness_m(above_tcp_m: f64) -> f64 {
     if above_tcp_m <= FINGER_ROOT_ABOVE_TCP_M { FINGER_THICKNESS_M } else { FINGER_ROOT_THICKNESS_M }
 }

@@ -1,4 +1,4 @@
-//! The known arms, one file each.
+//! The known arms, one file for each.
 
 mod fr3;
 mod franka_hand;

@@ -2,8 +2,8 @@
 //!
 //! # Source
 //! Lengths and limits: Franka Control Interface documentation, "Robot and interface specifications". Franka publishes
-//! no masses: these are the simulated arm's (crates/simulation/assets/panda.xml), which are plausible but not
-//! identified.
+//! no masses. The masses are those of the simulated arm (crates/simulation/assets/panda.xml), which are plausible but
+//! were not identified from measurements.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -81,11 +81,11 @@ impl CartesianLimits {
     }
 }
 
-/// The hand and the held part, as indices of the bodies.
+/// The hand, as an index of the bodies.
 const HAND: usize = 8;
 const HELD: usize = 9;
-/// Missing pairs of bodies are neighbours or kept apart by the joints' ranges; a test in `simulation` compares this
-/// with MuJoCo.
+/// Pairs of bodies that can collide. Missing pairs are neighbours, or are kept apart by the joints' ranges; a test in
+/// `simulation` compares the pairs with MuJoCo.
 const SELF_PAIRS: [(usize, usize); 23] = [
     (0, 5),
     (0, 6),
@@ -112,14 +112,14 @@ const SELF_PAIRS: [(usize, usize); 23] = [
     (5, HELD),
 ];
 
-/// Each capsule was placed by hand around shapes of crates/simulation/assets/panda.xml;
-/// crates/simulation/tests/collision_model.rs measures how far they extend beyond the arm and that they contain all of
-/// it.
+/// Capsules placed by hand around the shapes of crates/simulation/assets/panda.xml. The test
+/// crates/simulation/tests/collision_model.rs checks that they contain the whole arm, and measures how far they extend
+/// beyond it.
 fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [
         vec![
-            // Column, then the foot: low at both sides, front and back, and higher up.
+            // The column, then the foot: low at both sides, in front and behind, and higher up.
             c([0.0, 0.0, 0.06], [0.0, 0.0, 0.12], 0.062),
             c([-0.115, 0.055, 0.012], [0.036, 0.055, 0.012], 0.050),
             c([-0.115, -0.055, 0.012], [0.036, -0.055, 0.012], 0.050),
@@ -163,7 +163,7 @@ fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     ]
 }
 
-/// A test in `simulation` compares these with the shapes of the simulated arm.
+/// Fewer and wider capsules. A test in `simulation` compares them with the shapes of the simulated arm.
 fn wide_capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [

@@ -26,7 +26,7 @@ impl Body {
     /// The part that the hand holds.
     pub const HELD_PART: Self = Self(HELD);
 
-    /// A link by its number, 1 to 7.
+    /// A link by its number, from 1 to 7.
     pub fn link(number: usize) -> Self {
         assert!((1..=NUM_JOINTS).contains(&number), "links are numbered 1 to 7, found {number}");
         Self(number)
@@ -36,7 +36,7 @@ impl Body {
         Self(index)
     }
 
-    /// The index in the chain: 0 the base, 8 the hand, 9 the held part.
+    /// The index in the chain: 0 is the base, 8 the hand, 9 the held part.
     pub fn index(self) -> usize {
         self.0
     }
@@ -58,18 +58,18 @@ impl std::fmt::Display for Body {
 pub(super) struct ArmShape {
     joints: [DhJoint; NUM_JOINTS],
     link7_from_tcp: Isometry3<f64>,
-    /// For each body in its frame: the base frame, the links' by Denavit and Hartenberg, and link 7's for hand and held
-    /// part.
+    /// The capsules of each body in the body's frame: the base frame, the link's frame (Denavit and Hartenberg), and
+    /// link 7's frame for hand and held part.
     pub(super) capsules: [Vec<Capsule>; NUM_BODIES],
-    /// A ball around each body's capsules: centre in the body's frame, radius.
+    /// A sphere around the capsules of each body: centre in the body's frame, radius.
     pub(super) bounds: [(Point3<f64>, f64); NUM_BODIES],
     /// `reach_m[body][joint]`: upper bound of the distance of the body's points from the joint's axis, m; 0 for joints
-    /// that do not move it.
+    /// that do not move the body.
     pub(super) reach_m: [[f64; NUM_JOINTS]; NUM_BODIES],
 }
 
 impl ArmShape {
-    /// An arm with its fingers at an opening (m), holding nothing.
+    /// The shape of an arm with its fingers at an opening (m), without a held part.
     pub(super) fn new(arm: &ArmGeometry, opening_m: f64) -> Self {
         let link7_from_hand = arm.link7_from_hand();
         let mut capsules: [Vec<Capsule>; NUM_BODIES] = Default::default();
@@ -86,7 +86,7 @@ impl ArmShape {
         shape
     }
 
-    /// Puts capsules, in the tcp's frame, into the hand.
+    /// Adds the capsules of a held part, given in the tcp's frame.
     pub(super) fn hold(&mut self, in_tcp: &[Capsule]) {
         self.capsules[HELD] = in_tcp.iter().map(|capsule| capsule.moved(&self.link7_from_tcp)).collect();
         self.update();
@@ -110,7 +110,7 @@ pub(super) fn base_from_body(frames: &Frames, body: usize) -> Isometry3<f64> {
     }
 }
 
-/// The hand's body and both fingers, in the hand's frame.
+/// The body of the hand and both fingers, in the hand's frame.
 fn hand_capsules(arm: &ArmGeometry, opening_m: f64) -> impl Iterator<Item = Capsule> {
     let finger = &arm.hand.finger;
     let finger_y = 0.5 * opening_m.clamp(0.0, arm.hand.opening_max_m) + finger.middle_m;
@@ -122,7 +122,7 @@ fn hand_capsules(arm: &ArmGeometry, opening_m: f64) -> impl Iterator<Item = Caps
     arm.hand.capsules.iter().copied().chain(fingers)
 }
 
-/// A ball that contains capsules: its centre is the centre of the box around them.
+/// A sphere that contains capsules, about the centre of the box around them.
 fn bounding_ball(capsules: &[Capsule]) -> (Point3<f64>, f64) {
     let ends =
         || capsules.iter().flat_map(|capsule| [(capsule.from, capsule.radius_m), (capsule.to, capsule.radius_m)]);
@@ -137,7 +137,7 @@ fn bounding_ball(capsules: &[Capsule]) -> (Point3<f64>, f64) {
     (centre, radius_m)
 }
 
-/// Bounds of the distances between a body's points and the joints' axes, see [`ArmShape::reach_m`].
+/// Upper bounds of the distances between a body's points and the joints' axes, see [`ArmShape::reach_m`].
 fn reach_m(joints: &[DhJoint; NUM_JOINTS], body: usize, capsules: &[Capsule]) -> [f64; NUM_JOINTS] {
     let last_joint = body.min(NUM_JOINTS);
     let over_ends = |distance: fn(&Point3<f64>) -> f64| {
@@ -146,7 +146,7 @@ fn reach_m(joints: &[DhJoint; NUM_JOINTS], body: usize, capsules: &[Capsule]) ->
             .map(|capsule| distance(&capsule.from).max(distance(&capsule.to)) + capsule.radius_m)
             .fold(0.0, f64::max)
     };
-    // A joint turns about the z axis of its own link.
+    // A joint rotates about the z axis of its own link.
     let from_own_axis = over_ends(|p| p.x.hypot(p.y));
     let from_origin = over_ends(|p| p.coords.norm());
     std::array::from_fn(|joint_idx| {
@@ -161,14 +161,14 @@ fn reach_m(joints: &[DhJoint; NUM_JOINTS], body: usize, capsules: &[Capsule]) ->
     })
 }
 
-/// An upper bound of the distance between the origins of two links, the first before the second, m.
+/// An upper bound of the distance between the origins of two links, m; `first` is nearer to the base.
 fn origin_distance_m(joints: &[DhJoint; NUM_JOINTS], first: usize, second: usize) -> f64 {
     let step = |link: usize| joints[link - 1].a_m.hypot(joints[link - 1].d_m);
     let mut distance_m = 0.0;
     let mut at = first;
     while at < second {
         // If a link's origin lies on the next joint's axis, and the link after that starts perpendicular to that axis,
-        // the distance to it is independent of the joint.
+        // the distance to that link's origin is independent of the joint.
         if at + 2 <= second && joints[at].a_m == 0.0 && joints[at + 1].d_m == 0.0 {
             distance_m += step(at + 1).hypot(step(at + 2));
             at += 2;

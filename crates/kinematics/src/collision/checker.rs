@@ -1,11 +1,11 @@
-//! Parallel collision checks of several configurations, and checks of whole motions.
+//! Collision checks of several configurations in parallel, and of whole motions.
 //!
 //! An edge is the straight motion in joint space between two configurations. It is checked by *conservative
-//! advancement*: at a configuration each pair of bodies has a distance d, and an upper bound v of their approach speed
-//! along the edge, from the joints' turns and the bodies' reach. Within d / v further along, that pair cannot touch. So
-//! steps are long in free space and short near obstacles, and the edge between two checked configurations is proven
-//! free, too. Lanes start at evenly distributed points of the edge and each advances to the next one's start. Curves
-//! are proven in the same way, with the largest rate of each joint along them.
+//! advancement*: at a configuration, each pair of bodies has a distance d and an upper bound v of its approach speed
+//! along the edge, from the angles that the joints cover and the bodies' reach. Over the next d / v of the edge, the
+//! pair cannot touch. Steps are therefore long in free space and short near obstacles, and the edge is also proven free
+//! between two checked configurations. Lanes start at evenly distributed points of the edge, and each advances to the
+//! next lane's start. Curves are proven in the same way, with the largest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::lanes::{Lane, NUM_LANES};
@@ -23,7 +23,7 @@ pub struct Checker<'a> {
     num_checked: usize,
 }
 
-/// The lanes that have not reached their ends.
+/// The lanes that have not reached their end.
 #[derive(Debug, Clone, Copy)]
 struct Lanes {
     lanes: [usize; NUM_LANES],
@@ -46,8 +46,7 @@ impl Lanes {
 }
 
 impl<'a> Checker<'a> {
-    /// For motions that keep `margin_m` from everything at every checked configuration, and never touch anything
-    /// between these.
+    /// For motions that keep `margin_m` from all bodies at every checked configuration, and touch none between these.
     ///
     /// A larger margin allows longer steps near obstacles.
     pub fn new(model: &'a CollisionModel, margin_m: f64) -> Self {
@@ -60,12 +59,12 @@ impl<'a> Checker<'a> {
         self.model
     }
 
-    /// The distance kept at checked configurations, m.
+    /// The minimum distance at checked configurations, m.
     pub fn margin_m(&self) -> f64 {
         self.margin_m
     }
 
-    /// Number of configurations checked so far; idle lanes do not count.
+    /// Number of configurations checked so far, without those of idle lanes.
     pub fn num_checked(&self) -> usize {
         self.num_checked
     }
@@ -84,7 +83,7 @@ impl<'a> Checker<'a> {
         distances
     }
 
-    /// Whether a configuration keeps the margin.
+    /// Whether the margin is kept at a configuration.
     pub fn is_free(&mut self, q: &JointVector) -> bool {
         self.num_checked += 1;
         !self.evaluate(&[*q; NUM_LANES], &Weights::DISTANCES, true).is_blocked[0]
@@ -95,23 +94,23 @@ impl<'a> Checker<'a> {
         self.blocked_share(from, to).is_none()
     }
 
-    /// The first point found on the straight motion that violates the margin, as a share of its length; not always the
-    /// one nearest to the start.
+    /// The first point found on the straight motion that violates the margin, as a fraction of its length; not always
+    /// the one nearest to the start.
     pub fn blocked_share(&mut self, from: &JointVector, to: &JointVector) -> Option<f64> {
         let delta = to - from;
         self.blocked_share_of_curve(|share| from + delta * share, &delta.abs())
     }
 
-    /// As [`Checker::blocked_share`] on any curve, given by its configuration at a share of its length; `max_turns` is
-    /// each joint's turn over the whole curve at its largest rate, rad.
+    /// Like [`Checker::blocked_share`], for any curve, given by its configuration at a fraction of its length.
+    /// `max_turns` bounds the angle that each joint covers along the curve: its largest rate times the length, rad.
     pub(crate) fn blocked_share_of_curve(
         &mut self,
         at: impl Fn(f64) -> JointVector,
         max_turns: &JointVector,
     ) -> Option<f64> {
         let weights = self.edge_weights(max_turns);
-        // Lane i starts at i of L - 1 parts of the length and goes to where the next one started; the last one is at
-        // the end.
+        // Lane i starts at the fraction i / (L - 1) of the length, and ends at the start of the next lane. The last lane
+        // is at the end.
         let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
         let mut share: Lane = std::array::from_fn(start);
         let mut active: Lanes = Lanes::all();
@@ -131,13 +130,13 @@ impl<'a> Checker<'a> {
         None
     }
 
-    /// Distance along an edge, as a share of it, that each pair allows per metre of distance.
+    /// The fraction of an edge that each pair allows per metre of distance.
     fn edge_weights(&self, max_turns: &JointVector) -> Weights {
         let reach_m = &self.model.arm.reach_m;
         let speed_m = |body: usize, since_joint: usize| -> f64 {
             (since_joint..NUM_JOINTS).map(|joint_idx| reach_m[body][joint_idx] * max_turns[joint_idx]).sum()
         };
-        // A pair without relative motion gets infinity: any distance lasts for the whole edge.
+        // A pair without relative motion gets infinity: any distance is sufficient for the whole edge.
         let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };
         Weights {
             // Joints before the first body's own joint move both equally.
@@ -147,7 +146,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Compares all pairs; ends early, with some lane blocked, if `until_blocked` allows it.
+    /// Compares all pairs. With `until_blocked`, it ends as soon as a lane is blocked.
     fn evaluate(&mut self, q: &[JointVector; NUM_LANES], weights: &Weights, until_blocked: bool) -> Found {
         let Self { model, margin_m, arch, placed, .. } = self;
         arch.dispatch(
@@ -223,7 +222,7 @@ mod tests {
             let model = crowded(&mut rng);
             let q = random_configuration(&mut rng);
             let found = model.nearest(&q);
-            // With a capsule's axis inside an obstacle, the closest face may change.
+            // If a capsule's axis is inside an obstacle, the closest face may change.
             if found.distance_m < -0.01 {
                 continue;
             }
@@ -274,7 +273,7 @@ mod tests {
 
     #[test]
     fn an_allowed_pair_may_touch_and_others_may_not() {
-        // A plate that only the finger tips reach: they are at 0.4869 m in the ready pose.
+        // A plate that only the fingertips reach: they are at 0.4869 m in the ready pose.
         let table = Obstacle {
             name: "table".to_owned(),
             shape: Shape::Box { half_m: [0.1, 0.1, 0.005] },
@@ -287,6 +286,6 @@ mod tests {
         assert!(!Checker::new(&model, 0.001).is_free(&ready_pose()));
         model.allow(Body::HAND, "table").unwrap();
         assert!(Checker::new(&model, 0.001).is_free(&ready_pose()), "{}", model.nearest(&ready_pose()));
-        assert!(model.allow(Body::HAND, "tray").unwrap_err().to_string().contains("there are: table"));
+        assert!(model.allow(Body::HAND, "tray").unwrap_err().to_string().contains("the obstacles are: table"));
     }
 }

@@ -1,4 +1,4 @@
-//! Errors of obstacles.
+//! Errors of the collision model.
 
 /// Errors of building a collision model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -7,35 +7,35 @@ pub enum CollisionError {
     /// A length is not a positive, finite number.
     #[error("{obstacle}: {what} must be {expected}, found {found}")]
     Size {
-        /// Which obstacle.
+        /// The obstacle.
         obstacle: String,
-        /// Which of its lengths.
+        /// The length.
         what: &'static str,
-        /// The accepted values.
+        /// The expected values.
         expected: &'static str,
         /// The given value, m.
         found: f64,
     },
-    /// A pose holds NaN or an infinity, or its quaternion is not of unit length.
+    /// A pose contains NaN or infinity, or its quaternion is not of unit length.
     #[error("{obstacle}: {reason}")]
     Pose {
-        /// Which obstacle.
+        /// The obstacle.
         obstacle: String,
-        /// The error of its pose.
+        /// The error of the pose.
         reason: String,
     },
-    /// Two obstacles with one name, which a message could not distinguish.
+    /// Two obstacles have the same name, so that a message could not distinguish them.
     #[error("two obstacles are named \"{name}\"")]
     NameTwice {
-        /// The name that is given twice.
+        /// The name of both.
         name: String,
     },
     /// A pair that may touch names an obstacle that does not exist.
-    #[error("no obstacle is named \"{name}\"; there are: {existing}")]
+    #[error("no obstacle is named \"{name}\"; the obstacles are: {existing}")]
     UnknownObstacle {
         /// The name that was given.
         name: String,
-        /// The names that exist.
+        /// The names of the obstacles.
         existing: String,
     },
 }

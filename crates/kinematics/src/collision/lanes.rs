@@ -1,7 +1,7 @@
-//! The arm at several configurations at once, one per lane: arrays of one coordinate each, which the compiler
+//! The arm at several configurations in parallel, one for each lane: arrays of one coordinate each, which the compiler
 //! vectorises.
 //!
-//! L lanes; every function is one loop over them without branches.
+//! Every function is one loop over all lanes, without branches.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use crate::capsule::nearest_shares;
@@ -13,10 +13,10 @@ use super::shape::DistanceAndSlope;
 /// Number of configurations computed in parallel.
 pub const NUM_LANES: usize = 8;
 
-/// One number per lane.
+/// One number for each lane.
 pub(super) type Lane = [f64; NUM_LANES];
 
-/// One point or vector per lane.
+/// One point or vector for each lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lane3 {
     pub(super) x: Lane,
@@ -81,7 +81,7 @@ pub(super) fn link_frames(joints: &[DhJoint; NUM_JOINTS], q: &[JointVector; NUM_
         for i in 0..NUM_LANES {
             (sine[i], cosine[i]) = q[i][joint_idx].sin_cos();
         }
-        // alpha is 0 or a quarter turn either way: the turned axes are the parent's, exchanged.
+        // alpha is 0 or ±90°, so the rotated axes are the parent's in another order.
         let (sin_alpha, cos_alpha) = joints[joint_idx].twist();
         let (a, d) = (joints[joint_idx].a_m, joints[joint_idx].d_m);
         let mut next = FrameLanes::base();
@@ -138,7 +138,7 @@ pub(super) fn point_distances(a: &Lane3, b: &Lane3) -> Lane {
     distances
 }
 
-/// A fixed frame's inverse: rows of its rotation, and its origin.
+/// The inverse of a fixed frame: rows of its rotation, and its origin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ToLocal {
     pub(super) rows: [[f64; 3]; 3],

@@ -1,4 +1,4 @@
-//! Collisions of the arm: with itself, and with the obstacles around it.
+//! Collisions of the arm with itself and with the obstacles around it.
 //!
 //! ```text
 //! capsules of every body ─┐
@@ -6,7 +6,7 @@
 //! pairs that may touch ───┘                   └─> nearest: names, distance, gradient
 //! ```
 //!
-//! Capsules contain the real shapes with some margin, so that arms with separate capsules are separate.
+//! Capsules contain the real shapes with some margin: if the capsules do not touch, the arm does not either.
 //! crates/simulation compares them with MuJoCo.
 
 mod arm_shape;

@@ -1,4 +1,4 @@
-//! The arm among obstacles: the pairs of bodies that may not touch, and their distances.
+//! The arm and the obstacles around it: the pairs of bodies that may not touch, and their distances.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -14,9 +14,9 @@ use crate::joints::{JointVector, NUM_JOINTS};
 /// A fixed solid in the base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// Its name in messages.
+    /// Name in messages.
     pub name: String,
-    /// Its shape, in its own frame.
+    /// Shape, in the obstacle's own frame.
     pub shape: Shape,
     /// Pose in the base frame.
     pub base_from_obstacle: Isometry3<f64>,
@@ -27,12 +27,12 @@ pub struct Obstacle {
 pub struct Proximity {
     /// The body of the arm.
     pub body: Body,
-    /// The obstacle's or the other body's name.
+    /// Name of the obstacle or of the other body.
     pub other: String,
-    /// Distance of their surfaces, m; negative where they overlap.
+    /// Distance between the surfaces, m; negative if they overlap.
     pub distance_m: f64,
-    /// Derivative of the distance by each joint, m/rad; one of several if a capsule's axis is inside an obstacle or
-    /// parallel to the nearest surface.
+    /// Derivative of the distance with respect to each joint, m/rad. It is one of several if a capsule's axis is inside
+    /// an obstacle or parallel to the nearest surface.
     pub gradient: JointVector,
 }
 
@@ -54,14 +54,14 @@ pub struct CollisionModel {
     pub(super) arm: ArmShape,
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) obstacle_frames: Vec<ToLocal>,
-    /// `may_touch[body][obstacle]`.
+    /// `may_touch[body][obstacle]`: whether contact is allowed.
     pub(super) may_touch: [Vec<bool>; NUM_BODIES],
 }
 
 impl CollisionModel {
-    /// An arm with its fingers at an opening (m) among obstacles.
+    /// The model of an arm among obstacles, with the fingers at an opening (m).
     ///
-    /// The base is not compared with obstacles, because it is bolted to one.
+    /// The base is not compared with obstacles, because it is fixed to one.
     ///
     /// # Errors
     /// [`CollisionError`] for impossible lengths and poses, and for duplicate names.
@@ -76,7 +76,7 @@ impl CollisionModel {
             return Err(CollisionError::Size {
                 obstacle: "the hand".to_owned(),
                 what: "opening",
-                expected: "from 0 to what the hand opens",
+                expected: "from 0 to the maximum opening of the hand",
                 found: opening_m,
             });
         }
@@ -85,8 +85,7 @@ impl CollisionModel {
         Ok(Self { geometry: arm.clone(), arm: ArmShape::new(arm, opening_m), obstacles, obstacle_frames, may_touch })
     }
 
-    /// Puts a part into the hand: capsules that contain it, in the tcp's frame. It may touch the hand and links 6 and
-    /// 7.
+    /// Adds a held part: capsules that contain it, in the tcp's frame. The part may touch the hand and links 6 and 7.
     ///
     /// # Errors
     /// [`CollisionError`] for coordinates that are not finite and radii that are not positive.
@@ -103,7 +102,7 @@ impl CollisionModel {
         Ok(())
     }
 
-    /// Allows a body to touch an obstacle, as the fingers the table on an approach.
+    /// Allows a body to touch an obstacle, for example the fingers to touch the table during an approach.
     ///
     /// # Errors
     /// [`CollisionError::UnknownObstacle`].
@@ -126,19 +125,20 @@ impl CollisionModel {
         &self.geometry
     }
 
-    /// The obstacles, in the order in which they were given.
+    /// The obstacles, in the given order.
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }
 
-    /// The capsules of a body: in the base frame for the base, in the link's for a link, in link 7's for hand and held part.
+    /// The capsules of a body: in the base frame for the base, in the link's frame for a link, in link 7's frame for
+    /// the hand and the held part.
     pub fn capsules(&self, body: Body) -> &[Capsule] {
         &self.arm.capsules[body.index()]
     }
 
-    /// The two closest bodies, with the derivative of their distance.
+    /// The two closest bodies, with the gradient of their distance.
     ///
-    /// Computed pair by pair and without bounds: slow; it is the reference for tests of [`super::Checker`].
+    /// Computed pair by pair and without bounds, which is slow; tests of [`super::Checker`] use it as the reference.
     pub fn nearest(&self, q: &JointVector) -> Proximity {
         let frames = self.geometry.frames(q);
         let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
@@ -158,8 +158,8 @@ impl CollisionModel {
                     let distance_m = (q - p).norm() - a.radius_m - b.radius_m;
                     if distance_m < nearest.distance_m {
                         let normal = (q - p).try_normalize(0.0).unwrap_or_else(nalgebra::Vector3::x);
-                        // The closest points of the surfaces move as those of the axes: a turn about an axis keeps its
-                        // radius.
+                        // The closest points of the surfaces move like those of the axes, because a rotation about an
+                        // axis keeps the radius.
                         let gradient =
                             moved_along(&frames, other, &q, &normal) - moved_along(&frames, one, &p, &normal);
                         let other_name = Body::of_index(one).to_string();
@@ -195,8 +195,8 @@ impl CollisionModel {
         nearest
     }
 
-    /// The obstacle with the deepest overlap with the arm's column, if any, and the depth (m): the column is the part
-    /// of link 1 around joint 1's axis, which does not move in any motion.
+    /// The obstacle with the deepest overlap with the arm's column, if any, and the depth (m). The column is the part
+    /// of link 1 around joint 1's axis, which no motion moves.
     pub fn overlap_with_column(&self) -> Option<(String, f64)> {
         let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, self.geometry.joints[0].d_m));
         let mut deepest: Option<(String, f64)> = None;
@@ -212,7 +212,7 @@ impl CollisionModel {
     }
 }
 
-/// Speed of a point of a body along a direction by each joint, m/rad.
+/// Derivative of a body point's position along a direction with respect to each joint, m/rad.
 fn moved_along(frames: &Frames, body: usize, point: &Point3<f64>, direction: &nalgebra::Vector3<f64>) -> JointVector {
     JointVector::from_fn(|joint_idx, _| {
         if joint_idx >= body.min(NUM_JOINTS) {

@@ -1,7 +1,7 @@
-//! The smallest distance between the arm and everything around it, for the configurations of all lanes.
+//! The smallest distance between the arm and all bodies around it, for the configurations of all lanes.
 //!
-//! Bodies are compared as balls, then as capsules around their centres; the exact distance is computed only if these
-//! bounds do not decide.
+//! Bodies are compared as spheres, then as capsules around their centres. The exact distance is computed only if these
+//! bounds are not sufficient.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::{FIRST_MOVING, NUM_BODIES};
@@ -13,7 +13,7 @@ use super::model::CollisionModel;
 use super::shape::{self, DistanceAndSlope, Shape};
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// Positions of the bodies' balls and capsules, for each lane.
+/// Positions of the bodies' spheres and capsules, for each lane.
 #[derive(Debug, Clone)]
 pub(super) struct Placed {
     balls: [Lane3; NUM_BODIES],
@@ -21,20 +21,20 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Memory for the bodies of a model; [`evaluate`] fills it.
+    /// Allocates memory for the bodies of a model, which [`evaluate`] fills.
     pub(super) fn new(model: &CollisionModel) -> Self {
         let capsules = std::array::from_fn(|body| vec![(Lane3::ZERO, Lane3::ZERO); model.arm.capsules[body].len()]);
         Self { balls: [Lane3::ZERO; NUM_BODIES], capsules }
     }
 }
 
-/// Factors of the distances before the minimum is taken: for each pair of bodies, and for each body and the fixed
-/// bodies.
+/// Factors by which distances are multiplied before the minimum is taken: for each pair of bodies, and for each body
+/// and the fixed bodies.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
     pub(super) self_pairs: [[f64; NUM_BODIES]; NUM_BODIES],
     pub(super) bodies: [f64; NUM_BODIES],
-    /// Added to each distance, m.
+    /// Length that is added to each distance, m.
     pub(super) offset_m: f64,
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Found {
     pub(super) is_blocked: [bool; NUM_LANES],
 }
 
-/// Compares all pairs; ends early, with some lane blocked, if `until_blocked` allows it.
+/// Compares all pairs. With `until_blocked`, it ends as soon as a lane is blocked.
 #[inline(always)]
 pub(super) fn evaluate(
     model: &CollisionModel,
@@ -115,7 +115,7 @@ struct Search {
 }
 
 impl Search {
-    /// Whether lower bounds of the distances, `bounds - radius_m`, exclude a smaller distance in every lane.
+    /// Whether lower bounds of the distances, `bounds - radius_m`, exclude a smaller weighted distance in every lane.
     #[inline(always)]
     fn can_skip(&self, bounds: &Lane, radius_m: f64, weight: f64) -> bool {
         let mut is_needed = false;
@@ -151,7 +151,7 @@ impl Search {
         weights: &Weights,
         shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
     ) {
-        // From the hand inwards: the outer bodies are most often close to something.
+        // From the hand to the base, because the outer bodies are close to an obstacle most often.
         for body in (FIRST_MOVING..NUM_BODIES).rev() {
             let capsules = &model.arm.capsules[body];
             if model.may_touch[body][index] || capsules.is_empty() {

@@ -1,7 +1,7 @@
-//! Shapes of obstacles, their signed distances, and their closest points to segments.
+//! Shapes of obstacles: their signed distances, and their closest points to segments.
 //!
-//! Every shape is convex, and the signed distance to a convex set is a convex function: along a segment it has one
-//! minimum, which is found by bisection of its slope. This works for all shapes, inside and outside.
+//! Every shape is convex, and the signed distance to a convex set is a convex function: it has one minimum along a
+//! segment, which is found by bisection of its slope. This applies to all shapes, inside and outside.
 
 use crate::capsule::clamp;
 use nalgebra::{Point3, Vector3};
@@ -9,21 +9,21 @@ use nalgebra::{Point3, Vector3};
 /// A solid obstacle in its own frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
-    /// All points with z ≤ 0: a table or a floor; turned, a wall.
+    /// All points with z ≤ 0: a table or a floor; rotated, a wall.
     Plane,
     /// A box around the origin.
     Box {
-        /// Half of its length along x, y and z.
+        /// Half of the lengths along x, y and z.
         half_m: [f64; 3],
     },
     /// A cylinder around z.
     Cylinder {
         /// Distance of the surface from the axis, in metres.
         radius_m: f64,
-        /// Half of its length along z.
+        /// Half of the length along z.
         half_length_m: f64,
     },
-    /// All points within a radius of a segment of z; a sphere if the segment has no length.
+    /// All points within a radius of a segment on the z axis; a sphere if the segment has length 0.
     Capsule {
         /// Distance of the surface from the axis, in metres.
         radius_m: f64,
@@ -49,11 +49,11 @@ impl Shape {
             direction[axis] = 1.0;
             self.distance_and_slope(p, direction).1
         };
-        // A point on the axis of a cylinder or capsule has no nearest surface point of its own; any direction is valid.
+        // A point on the axis of a cylinder or capsule has no unique nearest surface point; any direction is valid.
         Vector3::new(slope(0), slope(1), slope(2)).try_normalize(0.0).unwrap_or_else(Vector3::x)
     }
 
-    /// The closest point of a segment: its share of the length from `from` to `to`, and the signed distance there.
+    /// The closest point of a segment, as a fraction of the length from `from` to `to`, and its signed distance.
     pub fn nearest_on_segment(&self, from: &Point3<f64>, to: &Point3<f64>) -> (f64, f64) {
         const NUM_BISECTIONS: usize = 48;
         let along = to - from;
@@ -69,7 +69,7 @@ impl Shape {
             }
         }
         let share = 0.5 * (low + high);
-        // If the slope never changes its sign, the closest point is exactly an end.
+        // If the slope does not change its sign, the closest point is exactly an end.
         let share = if low == 0.0 {
             0.0
         } else if high == 1.0 {
@@ -104,7 +104,7 @@ pub(super) fn solid_box(p: [f64; 3], direction: [f64; 3], half: [f64; 3]) -> Dis
     let squared = out[0] * out[0] + out[1] * out[1] + out[2] * out[2];
     let outside = squared.sqrt();
     let outside_slope = out[0] * d[0] + out[1] * d[1] + out[2] * d[2];
-    // Inside, the closest face decides.
+    // Inside the box, the closest face determines the distance.
     let (first, first_slope) = if q[0] > q[1] { (q[0], d[0]) } else { (q[1], d[1]) };
     let (inside, inside_slope) = if first > q[2] { (first, first_slope) } else { (q[2], d[2]) };
     if squared > 0.0 { (outside, outside_slope) } else { (inside, inside_slope) }
@@ -133,7 +133,7 @@ pub(super) fn capsule(p: [f64; 3], direction: [f64; 3], radius: f64, half_length
     (distance - radius, p[0] * direction[0] + p[1] * direction[1] + z * direction[2])
 }
 
-/// `max(x, 0)` as one comparison: the standard library's version handles NaN, which prevents vectorisation.
+/// `max(x, 0)` as one comparison. The standard library's version handles NaN, which prevents vectorisation.
 #[inline(always)]
 fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
@@ -204,8 +204,8 @@ mod tests {
                 let sampled = (0..=2000)
                     .map(|i| shape.signed_distance_m(&(a + (b - a) * (f64::from(i) / 2000.0))))
                     .fold(f64::INFINITY, f64::min);
-                // The distance of samples from the closest point of the segment is at most half a step of 1/2000 of its
-                // length.
+                // The distance of samples from the closest point of the segment is at most half a step, which is 1/2000
+                // of its length.
                 assert!(found <= sampled + 1e-9 && found > sampled - 6e-4, "{shape:?}: {found} {sampled}");
             }
         }

@@ -1,7 +1,7 @@
-//! Torques of the arm: its masses, and the joint torques of a motion.
+//! Dynamics of the arm: its masses, and the joint torques of a motion.
 //!
 //! `τ = M(q) q̈ + C(q, q̇) q̇ + g(q) + rotor inertia · q̈ + damping · q̇`, by the recursive Newton-Euler algorithm:
-//! velocities and accelerations of the links are computed outwards from the base, forces and torques inwards. The same
+//! velocities and accelerations of the links are computed from the base outwards, forces and torques inwards. The same
 //! pass gives the tcp's velocity and acceleration.
 //!
 //! # Source
@@ -13,17 +13,17 @@ use crate::geometry::{ArmGeometry, DhJoint};
 pub use crate::inertia::LinkInertia;
 use crate::joints::{JointVector, NUM_JOINTS};
 
-/// Acceleration of free fall, m/s².
+/// Acceleration of gravity, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
 
-/// Masses of the arm and its load, with fingers and load at rest in the hand.
+/// Masses of the arm and its load; fingers and load are at rest in the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmDynamics {
     joints: [DhJoint; NUM_JOINTS],
     /// Link 7 to flange, and flange to tcp, along z, m.
     flange_offset_m: f64,
     tcp_offset_m: f64,
-    /// Links 1 to 7 in their frames by Denavit and Hartenberg; link 7 with hand, fingers, camera and load.
+    /// Links 1 to 7 in their frames (Denavit and Hartenberg); link 7 includes hand, fingers, camera and load.
     links: [LinkInertia; NUM_JOINTS],
     /// Inertia of the motors and gears behind each joint, kg·m².
     rotor_inertia: JointVector,
@@ -31,7 +31,7 @@ pub struct ArmDynamics {
     damping: JointVector,
 }
 
-/// Motion of a link relative to the base, and its rotation: linear in m/s and m/s², angular in rad/s and rad/s².
+/// Motion of the tcp relative to the base: linear in m/s and m/s², angular in rad/s and rad/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TcpMotion {
     pub(crate) velocity: Vector3<f64>,
@@ -40,16 +40,16 @@ pub(crate) struct TcpMotion {
     pub(crate) angular_acceleration: Vector3<f64>,
 }
 
-/// Rotations and positions of the links at a configuration, for several motions there.
+/// Rotations and positions of the links at a configuration, for several motions through it.
 #[derive(Debug, Clone)]
 pub(crate) struct Placed {
-    /// Each link's axes in its parent's frame.
+    /// The axes of each link in its parent's frame.
     parent_from_link: [Matrix3<f64>; NUM_JOINTS],
     base_from_tcp: Matrix3<f64>,
 }
 
 impl ArmDynamics {
-    /// An arm with its hand, the fingers at an opening (m), holding nothing.
+    /// The dynamics of an arm with its hand, the fingers at an opening (m), without a load.
     pub fn new(arm: &ArmGeometry, opening_m: f64) -> Self {
         let mut links = arm.links;
         let link7_from_hand = arm.link7_from_hand();
@@ -71,7 +71,7 @@ impl ArmDynamics {
         }
     }
 
-    /// The same with a load: its mass (kg) and its centre in the flange's frame (m), as a point.
+    /// Adds a load as a point mass: its mass (kg) and its centre in the flange's frame (m).
     ///
     /// # Panics
     /// For a negative mass or numbers that are not finite.
@@ -89,7 +89,7 @@ impl ArmDynamics {
         torques + self.damping.component_mul(velocity)
     }
 
-    /// The torques that hold the arm against gravity, N·m.
+    /// The torques that hold the arm at rest against gravity, N·m.
     pub fn gravity_nm(&self, q: &JointVector) -> JointVector {
         let zero = JointVector::zeros();
         self.of_motion(&self.placed(q), &zero, &zero, GRAVITY_M_S2).0
@@ -102,7 +102,7 @@ impl ArmDynamics {
             let (sin_q, cos_q) = q[joint].sin_cos();
             Matrix3::new(cos_q, -sin_q, 0.0, sin_q * cos_a, cos_q * cos_a, -sin_a, sin_q * sin_a, cos_q * sin_a, cos_a)
         });
-        // The hand's turn about z changes neither vector lengths nor the axis to the tcp.
+        // The hand's rotation about z changes neither lengths of vectors nor the axis to the tcp.
         let base_from_tcp = parent_from_link.iter().fold(Matrix3::identity(), |product, turn| product * turn);
         Placed { parent_from_link, base_from_tcp }
     }
@@ -121,7 +121,7 @@ impl ArmDynamics {
         gravity_m_s2: f64,
     ) -> (JointVector, TcpMotion) {
         let zero = Vector3::zeros();
-        // Of the parent, in its own frame; an upward acceleration of the base replaces gravity.
+        // Motion of the parent, in its own frame. An upward acceleration of the base replaces gravity.
         let (mut turning, mut turning_rate) = (zero, zero);
         let (mut moving, mut moving_rate) = (zero, Vector3::new(0.0, 0.0, gravity_m_s2));
         let mut forces = [(zero, zero); NUM_JOINTS];

@@ -9,12 +9,12 @@ use crate::test_poses::random_configuration;
 
 #[test]
 fn a_load_straight_out_weighs_what_its_lever_says() {
-    // The arm stretched to the side at the height of its shoulder: joint 2 at a right angle, the others at zero; the
-    // load is 1 m from joint 2's axis.
+    // The arm is stretched to the side at the height of its shoulder: joint 2 is at 90°, the others at 0. The load is 1
+    // m from the axis of joint 2.
     let mut q = JointVector::zeros();
     q[1] = std::f64::consts::FRAC_PI_2;
     let bare = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
-    // Outwards from joint 2: 0.316 + 0.384, then 0.088 across; the flange points back at the base, 0.088 m lower.
+    // Outwards from joint 2: 0.316 + 0.384; 0.088 across; the flange points back to the base, 0.088 m lower.
     let out_m = 0.3;
     let loaded = bare.clone().with_load(2.0, [0.0, 0.0, -out_m]);
     let difference = loaded.gravity_nm(&q) - bare.gravity_nm(&q);
@@ -25,7 +25,8 @@ fn a_load_straight_out_weighs_what_its_lever_says() {
 
 #[test]
 fn power_is_the_change_of_energy() {
-    // Without friction the joints' power is the rate of kinetic and potential energy; kinetic energy is half of velocity times momentum.
+    // Without friction, the joints' power is the rate of kinetic and potential energy; kinetic energy is half of
+    // velocity times momentum.
     const STEP_SECS: f64 = 1e-5;
     let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.04).with_load(0.7, [0.01, -0.02, 0.12]);
     let mut rng = Pcg64Mcg::seed_from_u64(41);

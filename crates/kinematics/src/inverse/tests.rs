@@ -97,7 +97,8 @@ fn the_search_mostly_finds_the_cheapest_of_a_dense_scan() {
         assert!(best.cost < found.cost + 1e-3);
         num_worse += usize::from(found.cost > best.cost * 1.01);
     }
-    // The coarse grid misses intervals of q7 narrower than its step, and configurations with the upper arm upright.
+    // The coarse grid misses intervals of q7 that are narrower than its step, and configurations with an upright upper
+    // arm.
     assert!(num_worse <= 16, "{num_worse} of 200");
 }
 
@@ -134,9 +135,9 @@ fn a_margin_asked_for_is_kept() {
 #[test]
 fn out_of_reach_names_the_distance() {
     let panda = ArmGeometry::panda();
-    // Arm stretched level at shoulder height: the wrist centre reaches 0.7193 m (both triangle sides), hand and wrist
-    // in line at most hypot(0.088, 0.107 + 0.1034) further. For a pose 3 m away at least 2.05 m are missing for any
-    // pose of the hand.
+    // The arm is stretched horizontally at shoulder height: the wrist centre reaches 0.7193 m (both sides of the
+    // triangle), and hand and wrist in line reach at most hypot(0.088, 0.107 + 0.1034) further. For a pose at 3 m, at
+    // least 2.05 m are missing at every orientation of the hand.
     let target = top_grasp(3.0, 0.0, 0.333, 0.0);
     let error = panda.inverse(&target, &ready_pose(), &IkOptions::default()).unwrap_err();
     let KinematicsError::OutOfReach { target_m, nearest, .. } = &error else {
@@ -153,7 +154,7 @@ fn out_of_reach_names_the_distance() {
 #[test]
 fn a_limit_that_forbids_a_pose_is_named() {
     let panda = ArmGeometry::panda();
-    // So close to the base, the elbow would have to fold beyond its 3.0718 rad.
+    // So close to the base, the elbow would have to fold beyond its limit of 3.0718 rad.
     let error = panda.inverse(&top_grasp(0.1, 0.0, 0.1, 0.0), &ready_pose(), &IkOptions::default()).unwrap_err();
     let KinematicsError::JointLimit { violation, nearest } = &error else {
         panic!("{error}");
@@ -196,7 +197,8 @@ fn the_same_question_has_the_same_bits_in_its_answer() {
 #[test]
 fn singular_configurations_are_reached_too() {
     let panda = ArmGeometry::panda();
-    // Upper arm upright (q1 and q3 share an axis); wrist with z6 in line with the arm; elbow as straight as possible.
+    // The upper arm is upright (q1 and q3 have the same axis); the wrist has z6 in line with the arm; the elbow is as
+    // straight as possible.
     let mut upright = ready_pose();
     upright[1] = 0.0;
     let mut straight = ready_pose();
@@ -270,7 +272,8 @@ fn an_arm_without_a_closed_form_is_solved_by_descent() {
     assert!(matches!(error, KinematicsError::OutOfReach { .. }), "{error}");
 }
 
-/// Universal Robots' UR5e by its published Denavit–Hartenberg parameters, in Craig's convention, with Franka's hand and without a shape.
+/// Universal Robots' UR5e with its published Denavit–Hartenberg parameters in Craig's convention, with Franka's hand
+/// and without a shape.
 fn ur5e() -> ArmGeometry {
     let [quarter, back] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2];
     let rows = [
@@ -286,7 +289,7 @@ fn ur5e() -> ArmGeometry {
     let mut limits = panda.limits.clone();
     limits.position_min = JointVector::repeat(-PI);
     limits.position_max = JointVector::repeat(PI);
-    // It has six joints.
+    // The arm has six joints.
     (limits.position_min[6], limits.position_max[6]) = (0.0, 0.0);
     ArmGeometry {
         joints: rows.map(|(a_m, d_m, alpha_rad)| crate::geometry::DhJoint { a_m, d_m, alpha_rad }),
@@ -301,7 +304,7 @@ fn ur5e() -> ArmGeometry {
 #[test]
 fn a_third_arm_of_six_joints_is_another_value() {
     let arm = ur5e();
-    // Stretched at zero: -0.425 - 0.3922 along x, -0.1333 - 0.0996 along y, 0.1625 - 0.0997 up.
+    // Stretched at zero: -0.425 - 0.3922 along x, -0.1333 - 0.0996 along y, 0.1625 - 0.0997 upwards.
     let flange = arm.base_from_flange(&JointVector::zeros()).translation.vector;
     assert!((flange - nalgebra::Vector3::new(-0.8172, -0.2329, 0.0628)).norm() < 1e-12, "{flange}");
     let mut rng = Pcg64Mcg::seed_from_u64(22);
@@ -309,7 +312,7 @@ fn a_third_arm_of_six_joints_is_another_value() {
         let target =
             top_grasp(-rng.random_range(0.35..0.55), rng.random_range(-0.3..0.3), 0.3, rng.random_range(-PI..PI));
         let solutions = arm.inverse_all(&target, &arm.ready, &IkOptions::default()).unwrap();
-        // Elbow, shoulder and wrist, two solutions each.
+        // Two solutions each for elbow, shoulder and wrist.
         assert!(solutions.len() >= 4, "{}", solutions.len());
         for solution in &solutions {
             assert_reaches(&arm, &target, solution);

@@ -17,7 +17,7 @@ fn descent(panda: &ArmGeometry) -> JointPath {
 
 #[test]
 fn the_tcp_stays_on_the_line_between_waypoints_too() {
-    // Quintic pieces of 5 mm: far below the resolution of any robot.
+    // The error of quintic pieces of 5 mm, far below the resolution of any robot.
     const TOLERANCE: f64 = 1e-8;
     let panda = ArmGeometry::panda();
     let path = descent(&panda);
@@ -91,7 +91,7 @@ fn most_descents_from_the_best_configuration_succeed() {
             }
         }
     }
-    // The others need another start configuration, which `Panda::approach` chooses.
+    // The other lines need another start configuration, which `Panda::approach` chooses.
     assert!(num_followed >= 285, "{num_followed}");
 }
 
@@ -99,12 +99,12 @@ fn most_descents_from_the_best_configuration_succeed() {
 fn the_elbow_slides_away_from_limits_without_moving_the_tcp() {
     let panda = ArmGeometry::panda();
     let limits = &panda.limits;
-    // Sum of the fourth powers of the joints' positions in their ranges, -1 to 1.
+    // Sum of the fourth powers of the joints' positions in their ranges, from -1 to 1.
     let crowding = |q: &JointVector| {
         let half_range = (limits.position_max - limits.position_min) * 0.5;
         (q - limits.middle()).component_div(&half_range).map(|u| u.powi(4)).sum()
     };
-    // An elbow turned far to one side.
+    // The elbow is far to one side.
     let mut seed = ready_pose();
     (seed[0], seed[2]) = (1.6, -1.6);
     let nearest_to_seed = IkOptions { posture_weight: 0.0, limit_weight: 0.0, ..IkOptions::default() };
@@ -129,7 +129,7 @@ fn a_path_out_of_reach_says_how_far_it_gets() {
     else {
         panic!("{error}");
     };
-    // From x = 0.31 to 1.2, the arm ends near 0.75.
+    // The line is from x = 0.31 to 1.2; the arm's reach ends near 0.75.
     assert!((0.3..0.7).contains(&at_share), "{at_share}");
 }
 

@@ -1,18 +1,17 @@
-//! Rounded corners: a path that the arm follows without stopping at its waypoints, where it is free of collisions.
+//! Rounds corners: the arm then follows a path without stopping at waypoints, where this is free of collisions.
 
 use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::rounded_path::{Corner, RoundedPath, length_secs};
 
-/// Sizes tried for a corner, each this factor times the one before, down to the minimum; below it the arm stops
-/// instead.
+/// Factor between the sizes that are tried for a corner, down to the minimum. Below the minimum the arm stops instead.
 const SMALLER: f64 = 0.7;
 const MIN_SIZE_SECS: f64 = 2e-3;
-/// If a found size could be increased only by less than this, no further check is made.
+/// Minimum factor by which a found size could be increased for a further check.
 const MIN_GROWTH: f64 = 1.15;
 
-/// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole.
-/// There are several paths, each starting where the one before ends, if no rounding of a waypoint is free.
+/// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole. If
+/// no rounding of a waypoint is free, there are several paths, each starting where the previous one ends.
 pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec<RoundedPath> {
     let mut waypoints = waypoints.to_vec();
     waypoints.dedup_by(|next, before| length_secs(before, next) < MIN_LENGTH_SECS);
@@ -24,8 +23,8 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
         waypoints.windows(3).map(|three| Corner { before: three[0], waypoint: three[1], after: three[2] }).collect();
     let last = corners.len();
     let mut sizes = vec![0.0; corners.len()];
-    // First each corner gets half of the straight parts beside it, or all if these start or end the path; then the rest
-    // that its neighbours leave.
+    // First, each corner gets half of the straight parts beside it, or all of a part that starts or ends the path. Then
+    // it gets the length that its neighbours did not use.
     for index in 0..last {
         let before = lengths[index] * if index == 0 { 1.0 } else { 0.5 };
         let after = lengths[index + 1] * if index + 1 == last { 1.0 } else { 0.5 };
@@ -39,7 +38,8 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
     split_at_stops(&waypoints, &sizes)
 }
 
-/// The largest tried size up to `room` for which the corner is free, at least `known_free`; 0 if there is none.
+/// The largest size up to `room`, among those tried, for which the corner is free; at least `known_free`; 0 if there is
+/// none.
 fn largest_free(checker: &mut Checker<'_>, corner: &Corner, room: f64, known_free: f64) -> f64 {
     let mut size = room;
     while size > (known_free * MIN_GROWTH).max(MIN_SIZE_SECS) {
@@ -66,5 +66,5 @@ fn split_at_stops(waypoints: &[JointVector], sizes: &[f64]) -> Vec<RoundedPath> 
     ways
 }
 
-/// Waypoints closer together than this are one.
+/// Waypoints closer together than this are one waypoint.
 const MIN_LENGTH_SECS: f64 = 1e-9;

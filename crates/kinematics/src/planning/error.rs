@@ -1,4 +1,4 @@
-//! The reason why there is no plan: the link, the obstacle, the limit.
+//! The error type of planning, which names the cause: the link, the obstacle, the limit.
 
 use crate::collision::Proximity;
 use crate::error::KinematicsError;
@@ -7,12 +7,12 @@ use crate::error::KinematicsError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// An invalid input, a start beyond the joints' ranges, or a goal that no configuration reaches.
+    /// An input is invalid, the start is outside the joints' ranges, or no configuration reaches a goal.
     #[error("{what}: {cause}")]
     Kinematics {
-        /// Which input.
+        /// The input.
         what: String,
-        /// Its error.
+        /// The error of the input.
         cause: KinematicsError,
     },
     /// No goal was given.
@@ -21,11 +21,11 @@ pub enum PlanError {
     /// An option is outside its range.
     #[error("{option} must be {expected}, found {found}")]
     InvalidOption {
-        /// Which option.
+        /// The option.
         option: &'static str,
-        /// The accepted values.
+        /// The expected values.
         expected: &'static str,
-        /// The given value.
+        /// The value found.
         found: f64,
     },
     /// An obstacle overlaps the fixed part of the arm's first link.
@@ -34,12 +34,12 @@ pub enum PlanError {
         .depth_m * 1e3
     )]
     EnclosesRobot {
-        /// Its name.
+        /// The name of the obstacle.
         obstacle: String,
         /// The depth of the overlap, m.
         depth_m: f64,
     },
-    /// The start is in collision, or closer to something than the margin.
+    /// The start is in collision, or closer to a body than the margin.
     #[error("the start is not free: {nearest}; at least {:.1} mm are required", .margin_m * 1e3)]
     StartBlocked {
         /// The body that is too close.
@@ -47,26 +47,26 @@ pub enum PlanError {
         /// The required distance, m.
         margin_m: f64,
     },
-    /// Every configuration that reaches the goal is in collision, or closer to something than the margin.
+    /// All configurations that reach the goal are in collision, or closer to a body than the margin.
     #[error(
         "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at \
          least {:.1} mm are required",
         .margin_m * 1e3
     )]
     GoalBlocked {
-        /// Number of tried configurations within the joints' ranges.
+        /// Number of configurations that were tried, within the joints' ranges.
         num_configurations: usize,
-        /// The body that is too close to the best of them.
+        /// The body that is too close in the best of these configurations.
         nearest: Proximity,
         /// The required distance, m.
         margin_m: f64,
     },
-    /// The straight approach ends early from every configuration that reaches its start.
+    /// The straight approach is blocked from every configuration that reaches its start.
     #[error("at most {:.0} % of the approach can be followed: {why}", .share * 100.0)]
     ApproachBlocked {
-        /// The largest free share of the approach, 0 to 1.
+        /// The largest free fraction of the approach, 0 to 1.
         share: f64,
-        /// The reason for its end there.
+        /// The reason why the approach is blocked there.
         why: String,
     },
     /// The search ended without a path.
@@ -74,7 +74,7 @@ pub enum PlanError {
     NotFound {
         /// Number of checked configurations.
         num_checks: usize,
-        /// Pairs that blocked motions, the most frequent first, each with its share.
+        /// Pairs that blocked motions, the most frequent first, each with its fraction.
         blockers: Vec<(String, f64)>,
     },
 }

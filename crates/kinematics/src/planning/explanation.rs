@@ -1,4 +1,4 @@
-//! A plan part by part: the duration of each part, and the closest body during it.
+//! Explains a plan part by part: the duration of each part, and the closest body during it.
 
 use crate::collision::{Checker, CollisionModel, Proximity};
 use crate::planning::plan::Plan;
@@ -10,15 +10,15 @@ const NUM_PLACES: usize = 64;
 /// The path from one waypoint to the next, each at the closest point of its rounded corner.
 #[derive(Debug, Clone)]
 pub struct PlanPart {
-    /// The waypoint at its end.
+    /// The waypoint at the end.
     pub end: JointVector,
-    /// Its duration.
+    /// Duration.
     pub secs: f64,
-    /// The closest body during it.
+    /// The closest body during the part.
     pub nearest: Proximity,
 }
 
-/// The motion between waypoints: it passes a waypoint where it is closest to it.
+/// The parts of a plan, with their motion: a waypoint is passed where the motion is closest to it.
 pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -> Vec<PlanPart> {
     let mut parts = Vec::new();
     let mut waypoints = plan.waypoints[1..].iter();
@@ -40,9 +40,9 @@ pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -
     parts
 }
 
-/// Number of points on a motion among which the closest to a waypoint is searched.
+/// Number of points on a motion among which the closest one to a waypoint is searched.
 const NUM_SAMPLES: usize = 1000;
-/// Configurations closer together than this are the same.
+/// Configurations closer together than this are equal, rad.
 const SAME_RAD: f64 = 1e-9;
 
 fn at_share(motion: &Trajectory, sample: usize) -> (JointVector, f64) {
@@ -57,9 +57,9 @@ pub fn nearest_on(model: &CollisionModel, from: &JointVector, to: &JointVector) 
     nearest_of(model, &places)
 }
 
-/// The closest body at some configurations.
+/// The closest body at any of the configurations.
 fn nearest_of(model: &CollisionModel, places: &[JointVector]) -> Proximity {
-    // The margin has no effect on distances.
+    // The margin does not affect distances.
     let distances = Checker::new(model, 1e-3).distances_m(places);
     let place = (0..places.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
     model.nearest(&places[place])

@@ -1,5 +1,5 @@
-//! Configurations that reach a goal: every branch of the arm at many angles of joint 7, of which the free ones are
-//! kept.
+//! Finds configurations that reach a goal: all branches of the arm at many angles of joint 7. Only the
+//! collision-free ones are kept.
 
 use nalgebra::Isometry3;
 
@@ -12,13 +12,13 @@ use crate::geometry::ArmGeometry;
 use crate::ik::IkOptions;
 use crate::joints::JointVector;
 
-/// Number of tried angles of joint 7.
+/// Number of angles of joint 7 that are tried.
 const NUM_ANGLES: usize = 48;
-/// Maximum number of kept configurations, the quickest to reach first.
+/// Maximum number of configurations that are kept, the fastest to reach.
 const MAX_KEPT: usize = 24;
-/// Minimum difference of the kept configurations, rad.
+/// Minimum difference between configurations that are kept, rad.
 const MIN_APART_RAD: f64 = 0.25;
-/// Positions this far beyond a limit are rounding errors.
+/// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 /// A configuration that reaches a goal.
@@ -29,10 +29,10 @@ pub(super) struct GoalConfiguration {
     pub(super) pose_idx: usize,
 }
 
-/// The free configurations of all poses, the quickest to reach from `start` first.
+/// The collision-free configurations of all poses, the fastest to reach from `start` first.
 ///
 /// # Errors
-/// Poses that are invalid or cannot be reached, or whose configurations are all blocked.
+/// Poses are invalid or cannot be reached, or all their configurations are blocked.
 pub(super) fn free_configurations(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,
@@ -48,8 +48,8 @@ pub(super) fn free_configurations(
         reaching.extend(configurations(arm, start, pose).into_iter().map(|q| GoalConfiguration { q, pose_idx }));
     }
     if reaching.is_empty() {
-        // The grid may miss poses that only a narrow range of angles reaches; inverse kinematics searches more finely,
-        // and gives the reason of a failure.
+        // The grid may miss poses that are reached only in a narrow range of angles. Inverse kinematics searches more
+        // finely, and gives the reason of a failure.
         for (pose_idx, pose) in poses.iter().enumerate() {
             match arm.inverse(pose, start, &IkOptions::default()) {
                 Ok(solution) => reaching.push(GoalConfiguration { q: solution.q, pose_idx }),
@@ -63,10 +63,10 @@ pub(super) fn free_configurations(
     free_of(arm, checker, start, reaching)
 }
 
-/// The free ones of some configurations, the quickest to reach from `start` first.
+/// The collision-free ones of these configurations, the fastest to reach from `start` first.
 ///
 /// # Errors
-/// None at all, or all blocked.
+/// There are no configurations, or all are blocked.
 pub(super) fn free_of(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,

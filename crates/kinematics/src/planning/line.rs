@@ -1,4 +1,4 @@
-//! Straight motions of the tcp among obstacles: approach and retreat.
+//! Straight motions of the tcp among obstacles, for approach and retreat.
 
 use nalgebra::Isometry3;
 
@@ -8,24 +8,24 @@ use crate::geometry::ArmGeometry;
 use crate::joints::JointVector;
 use crate::path::{JointPath, LineOptions};
 
-/// A straight motion of the tcp, and its free share.
+/// A straight motion of the tcp, and its free fraction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedLine {
-    /// Share of the motion that can be followed without a forbidden contact, 0 to 1.
+    /// Fraction of the motion that can be followed without a forbidden contact, 0 to 1.
     pub share: f64,
     /// The whole motion, if [`CheckedLine::share`] is 1.
     pub path: Option<JointPath>,
-    /// The reason for its end, if the share is smaller.
+    /// The reason why the motion is blocked, if the fraction is below 1.
     pub blocked_by: Option<String>,
 }
 
-/// Follows the straight line from the tcp's pose at `start` to a pose, and checks it against the checker's model.
+/// Follows the straight line from the tcp's pose at `start` to a pose, and checks it with the checker's model.
 ///
-/// The model defines the allowed contacts (of the fingers with the part, of the part with the table):
+/// The model defines the allowed contacts (of the fingers with the part, of the part with the table), see
 /// [`crate::collision::CollisionModel::allow`].
 ///
 /// # Errors
-/// [`KinematicsError`] for invalid input; a line that cannot be followed is not an error but has a share below 1.
+/// [`KinematicsError`] for invalid input. A line that cannot be followed is not an error: its fraction is below 1.
 pub fn checked_line(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,
@@ -38,7 +38,7 @@ pub fn checked_line(
         Err(
             error @ (KinematicsError::PathJointLimit { at_share, .. } | KinematicsError::PathBlocked { at_share, .. }),
         ) => {
-            // The path before that point may be blocked as well.
+            // The path up to that point may be blocked as well.
             let base_from_start = arm.forward(start);
             let share = at_share * FOLLOWED_AGAIN;
             let end = base_from_start.lerp_slerp(base_from_tcp_end, share);
@@ -56,10 +56,11 @@ pub fn checked_line(
     })
 }
 
-/// This share of the part that could be followed is followed again for the check: at its end a joint reaches its limit.
+/// Fraction of the followed part of a path that is followed again for the check: at the end of that part, a joint
+/// reaches its limit.
 const FOLLOWED_AGAIN: f64 = 0.98;
 
-/// The first blocked point of a path, as a share of it, and the obstacle.
+/// The first blocked point of a path, as a fraction of it, and the obstacle.
 fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, String)> {
     let margin_mm = checker.margin_m() * 1e3;
     let why = |checker: &Checker<'_>, q: &JointVector| {
@@ -71,7 +72,7 @@ fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, St
     }
     let num_pieces = waypoints.len() - 1;
     for (piece, pair) in waypoints.windows(2).enumerate() {
-        // Between waypoints the joints' path is straight up to a few µm.
+        // Between waypoints, the joints' path is straight except for a few µm.
         if let Some(share) = checker.blocked_share(pair[0], pair[1]) {
             let q = pair[0] + (pair[1] - pair[0]) * share;
             return Some((piece as f64 / num_pieces as f64, why(checker, &q)));

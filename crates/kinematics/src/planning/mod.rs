@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! start ────────────────────────┐
-//! goal poses ─> configurations ─┼─> RRT-Connect ─> shorter way ─> round corners ─> Plan ─> trajectories
-//! CollisionModel ─> Checker ────┘                                      approach ──┘
+//! goal poses ─> configurations ─┼─> RRT-Connect ─> shortcuts ─> round corners ─> Plan ─> trajectories
+//! CollisionModel ─> Checker ────┘                                    approach ──┘
 //! ```
 //!
-//! The planner has no clock: a search ends after a number of collision checks, and gives the same plan on every
+//! The planner has no clock: a search ends after a number of collision checks, so the plan is the same on every
 //! machine.
 
 mod corners;

@@ -1,4 +1,4 @@
-//! From a configuration to the best of several poses, around obstacles.
+//! Plans a motion from a configuration to the best of several poses, around obstacles.
 
 use std::collections::BTreeMap;
 
@@ -27,17 +27,17 @@ use crate::trajectory::Trajectory;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PlanOptions {
-    /// Seed of the random configurations: the same seed gives the same plan.
+    /// Seed of the random configurations. The same seed gives the same plan.
     pub seed: u64,
-    /// Distance kept to obstacles and between links that may not touch, m.
+    /// Minimum distance to obstacles, and between links that may not touch, m.
     pub margin_m: f64,
-    /// The longest motion added to a tree at once, rad.
+    /// Maximum length of a motion that is added to a tree at once, rad.
     pub step_rad: f64,
     /// Maximum number of configurations that the search checks.
     pub max_checks: usize,
     /// Number of attempts to shorten a path.
     pub num_shortcuts: usize,
-    /// Number of searches, of which the cheapest path is used, if no straight motion leads to a goal.
+    /// Number of searches if no straight motion leads to a goal; the cheapest path is used.
     pub num_searches: usize,
 }
 
@@ -52,38 +52,39 @@ impl Default for PlanOptions {
 pub struct StraightApproach<'a> {
     /// Length, m.
     pub length_m: f64,
-    /// The allowed contacts on it: the same obstacles with more pairs that may touch.
+    /// The model with the allowed contacts: the same obstacles, with more pairs that may touch.
     pub model: &'a CollisionModel,
 }
 
 /// A path around obstacles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Configurations, start and end included, connected by straight lines in joint space except for the corners, rad.
+    /// Configurations with start and end, connected by straight lines in joint space except for the corners, rad.
     pub waypoints: Vec<JointVector>,
-    /// The path through them with rounded corners. Usually one; several, each starting where the one before ends, if at
-    /// a waypoint no rounding is free and the arm must stop; none if start and end are the same.
+    /// The path through the waypoints with rounded corners. Usually one; several, each starting where the previous one
+    /// ends, if no rounding is free at a waypoint and the arm must stop there; none if start and end are the same.
     pub ways: Vec<RoundedPath>,
-    /// The straight end, if one was requested.
+    /// The straight approach, if one was requested.
     pub approach: Option<JointPath>,
     /// The index of the reached goal pose.
     pub goal_idx: usize,
-    /// Total number of checked configurations.
+    /// Number of all checked configurations.
     pub num_checks: usize,
-    /// Number of these before the first path was shortened.
+    /// Number of configurations that were checked before the first path was shortened.
     pub num_search_checks: usize,
-    /// Approximate duration of the first path before it was shortened, and of the plan, with stops at the waypoints at
-    /// full speed, s.
+    /// Approximate durations, s: of the first path before it was shortened, and of the plan; both with stops at the
+    /// waypoints and at full speed.
     pub cost_secs: [f64; 2],
 }
 
 impl Plan {
-    /// The motions in time, each from rest to rest: one along each of [`Plan::ways`], and the straight approach.
+    /// The motions in time, each from rest to rest: one along each of [`Plan::ways`], and one along the straight
+    /// approach.
     ///
-    /// `dynamics` are the arm's with its load; the approach's torques are not checked.
+    /// `dynamics` are those of the arm with its load. The torques of the approach are not checked.
     ///
     /// # Errors
-    /// As [`Trajectory::along_rounded_path`] and [`Trajectory::along_path`].
+    /// The errors of [`Trajectory::along_rounded_path`] and [`Trajectory::along_path`].
     pub fn trajectories(
         &self,
         limits: &JointLimits,
@@ -96,10 +97,10 @@ impl Plan {
         ways.chain(approach).collect()
     }
 
-    /// Duration of the free part, s, if the arm stopped at each waypoint, within the same limits.
+    /// Duration of the motion without the approach if the arm stopped at each waypoint, within the same limits, s.
     ///
     /// # Errors
-    /// As [`Trajectory::along_rounded_path`].
+    /// The errors of [`Trajectory::along_rounded_path`].
     pub fn stopping_secs(
         &self,
         limits: &JointLimits,
@@ -120,10 +121,10 @@ impl Plan {
 impl ArmGeometry {
     /// Plans a motion from `start` to one of several goal poses, around the obstacles of a model.
     ///
-    /// All poses of `goals` (turns about a part's symmetry, exchanged fingers) are tried with every branch of the arm
-    /// and many angles of joint 7. The result is the quickest that a straight motion reaches, otherwise the cheapest
-    /// path found by [`PlanOptions::num_searches`] searches towards all of them. With an approach, the path ends where
-    /// the approach starts, at a configuration from which the whole approach is free.
+    /// All poses of `goals` (rotations of a symmetric part, exchanged fingers) are tried with every branch of the arm
+    /// and many angles of joint 7. The result is the fastest straight motion to one of them, or else the cheapest path
+    /// found by [`PlanOptions::num_searches`] searches towards all of them. With an approach, the path ends where the
+    /// approach starts, at a configuration from which the whole approach is free.
     ///
     /// # Units and frames
     /// `start` in rad, `goals` as `base_from_tcp` in m.
@@ -149,10 +150,10 @@ impl ArmGeometry {
         self.search(checker, start, goals, approaches, options)
     }
 
-    /// As [`ArmGeometry::plan`], to one of several configurations (rad).
+    /// Like [`ArmGeometry::plan`], to one of several configurations (rad).
     ///
     /// # Errors
-    /// As [`ArmGeometry::plan`].
+    /// The errors of [`ArmGeometry::plan`].
     pub fn plan_to(
         &self,
         model: &CollisionModel,
@@ -172,7 +173,7 @@ impl ArmGeometry {
         self.search(checker, start, goals, Vec::new(), options)
     }
 
-    /// The cheapest path to one of the goals, which are sorted, the quickest first.
+    /// The cheapest path to one of the goals, which are sorted, the fastest first.
     fn search(
         &self,
         mut checker: Checker<'_>,
@@ -197,13 +198,13 @@ impl ArmGeometry {
         let is_straight = first.waypoints.len() == 2;
         let mut best = first;
         shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
-        // A further search may take a few times as long as the first: it looks for a better path.
+        // A further search may take a few times as long as the first, because it searches for a better path.
         growth.step_rad = growth.step_rad.min(FURTHER_STEP_RAD);
         growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
         for _ in 1..if is_straight { 1 } else { options.num_searches } {
             let best_secs = cost_secs(&best.waypoints, &self.limits);
-            // Goals are sorted, the quickest first: those that take longer even on a straight line cannot improve the
-            // result.
+            // Goals are sorted, the fastest first. Goals that take longer than the best path even on a straight line
+            // cannot improve the result.
             let num_quicker = goals.partition_point(|goal| motion_secs(start, &goal.q, &self.limits) < best_secs);
             if num_quicker == 0 {
                 break;
@@ -251,7 +252,7 @@ impl ArmGeometry {
         }
     }
 
-    /// Configurations before the approach from which it is free, and the approaches.
+    /// Configurations at which a free approach can start, and the approaches.
     fn approaches(
         &self,
         checker: &mut Checker<'_>,
@@ -283,14 +284,15 @@ impl ArmGeometry {
     }
 }
 
-/// Maximum number of checks of every further search, also as a multiple of those of the first.
+/// Maximum number of checks of a further search, unless [`FURTHER_CHECKS_RATIO`] allows more.
 const MIN_FURTHER_CHECKS: usize = 1000;
+/// Maximum number of checks of a further search, as a multiple of the first search's.
 const FURTHER_CHECKS_RATIO: usize = 2;
-/// The longest motion that a further search adds at once, rad: shorter motions than the first search's find narrower
-/// and quicker paths.
+/// Maximum length of a motion that a further search adds at once, rad. Shorter motions than those of the first search
+/// find narrower and faster paths.
 const FURTHER_STEP_RAD: f64 = 2.0;
 
-/// Straight to the quickest goal that can be reached in this way; goals are sorted, the quickest first.
+/// The straight motion to the fastest goal that can be reached in this way. Goals are sorted, the fastest first.
 fn straight(checker: &mut Checker<'_>, start: &JointVector, goals: &[GoalConfiguration]) -> Option<Found> {
     let goal_idx = goals.iter().position(|goal| checker.is_edge_free(start, &goal.q))?;
     Some(Found { waypoints: vec![*start, goals[goal_idx].q], goal_idx })
@@ -300,11 +302,11 @@ fn roots(goals: &[GoalConfiguration]) -> Vec<JointVector> {
     goals.iter().map(|goal| goal.q).collect()
 }
 
-/// Positions this far beyond a limit are rounding errors.
+/// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
-    /// Number of pairs named by a message.
+    /// Maximum number of pairs that a message names.
     const MAX_REPORTED: usize = 3;
     let mut counts = BTreeMap::<String, usize>::new();
     for q in stops.configurations() {

@@ -1,8 +1,9 @@
 //! RRT-Connect: a tree from the start and one from all goals grow towards random configurations and towards each other.
 //!
 //! # Source
-//! J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path planning", ICRA 2000. Here the
-//! goals' tree has several roots, the smaller tree grows, and motions are proven free as a whole ([`Checker`]).
+//! J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path planning", ICRA 2000.
+//! Differences: the goals' tree has several roots, the smaller tree grows, and motions are proven free as a whole
+//! ([`Checker`]).
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -11,10 +12,10 @@ use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 
-/// Limits and step size of a search.
+/// Step size and limit of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Growth {
-    /// The longest motion added at once, rad.
+    /// Maximum length of a motion that is added at once, rad.
     pub(super) step_rad: f64,
     /// Maximum number of checked configurations.
     pub(super) max_checks: usize,
@@ -24,7 +25,7 @@ pub(super) struct Growth {
 ///
 /// # Source
 /// J. Gammell, S. Srinivasa, T. Barfoot, "Informed RRT*: optimal sampling-based path planning focused via direct
-/// sampling of an admissible ellipsoidal heuristic", IROS 2014. The slowest joint's time is the cost here, so that
+/// sampling of an admissible ellipsoidal heuristic", IROS 2014. The cost is the time of the slowest joint, so that
 /// boxes replace the ellipsoids.
 #[derive(Debug, Clone)]
 pub(super) struct Samples(Vec<[JointVector; 2]>);
@@ -35,10 +36,10 @@ impl Samples {
         Self(vec![[limits.position_min, limits.position_max]])
     }
 
-    /// Only configurations that can be on a path to one of the goals with a duration below `max_secs` at full speed.
+    /// Only configurations that can be on a path to one of the goals whose duration at full speed is below `max_secs`.
     ///
-    /// On such a path a joint leaves the range between its start and its goal by at most half of its remaining travel.
-    /// Every goal must be reachable on a straight line within that time if there were no obstacles.
+    /// On such a path, a joint leaves the range between its start and its goal by at most half of its remaining travel.
+    /// Without obstacles, every goal must be reachable on a straight line within that time.
     pub(super) fn on_quicker_ways(
         limits: &JointLimits,
         start: &JointVector,
@@ -67,7 +68,7 @@ pub(super) struct Found {
     pub(super) goal_idx: usize,
 }
 
-/// Configurations at which motions were stopped, some of which are kept to report the cause.
+/// Configurations at which motions were blocked; some are kept for reporting the cause.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stops(Vec<JointVector>);
 
@@ -125,14 +126,14 @@ impl Tree {
     }
 }
 
-/// One step towards a configuration.
+/// The result of one step towards a configuration.
 enum Extension {
     Reached(usize),
     Advanced(usize),
     Stopped,
 }
 
-/// Searches a path from the start to any of the goals, all of them free; `None` when the checks are used up.
+/// Searches for a path from the start to any of the goals, all of which are free; `None` when the checks are used up.
 pub(super) fn rrt_connect(
     checker: &mut Checker<'_>,
     samples: &Samples,
@@ -170,7 +171,7 @@ pub(super) fn rrt_connect(
             let (mut waypoints, _) = from_start.way_to_root(in_start);
             let (rest, goal_idx) = from_goals.way_to_root(in_goals);
             waypoints.reverse();
-            // Both paths contain their meeting point.
+            // Both paths contain the configuration at which they meet.
             waypoints.extend_from_slice(&rest[1..]);
             return Some(Found { waypoints, goal_idx });
         }

@@ -1,4 +1,4 @@
-//! Shorter paths: replaces parts of a path by straight motions.
+//! Shortens a path by replacing parts of it with straight motions.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -7,9 +7,10 @@ use crate::collision::Checker;
 use crate::joints::JointVector;
 use crate::limits::JointLimits;
 
-/// Approximate time cost of a stop at a waypoint: braking from and accelerating to a large share of the full speed, s.
+/// Approximate time that a stop at a waypoint costs: braking from a large fraction of the full speed and accelerating
+/// to it, s.
 const STOP_SECS: f64 = 0.15;
-/// Minimum gain of a replacement, s; smaller gains are not worth their checks.
+/// Minimum gain of a replacement, s. Smaller gains do not justify the checks.
 const MIN_GAIN_SECS: f64 = 0.01;
 
 /// Approximate duration of a path with a stop at every waypoint, at full speed, s.
@@ -18,13 +19,13 @@ pub(super) fn cost_secs(waypoints: &[JointVector], limits: &JointLimits) -> f64 
     motion_secs + STOP_SECS * waypoints.len().saturating_sub(2) as f64
 }
 
-/// Duration of the slowest joint's motion at its full speed, s.
+/// Duration of the motion of the slowest joint at its full speed, s.
 pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLimits) -> f64 {
     (to - from).abs().component_div(&limits.velocity_max).max()
 }
 
-/// Replaces parts of a path by straight motions, with at most `attempts` attempts: first from waypoint to waypoint,
-/// then between random points; and moves waypoints.
+/// Replaces parts of a path with straight motions and moves waypoints, in at most `attempts` attempts: first from
+/// waypoint to waypoint, then between random points.
 pub(super) fn shorten(
     checker: &mut Checker<'_>,
     limits: &JointLimits,
@@ -56,12 +57,12 @@ pub(super) fn shorten(
     }
 }
 
-/// Moves a random waypoint to a random point nearby if that makes the path quicker, which tightens the path around an
-/// edge.
+/// Moves a random waypoint to a random point nearby if the path is then faster. This tightens the path around an edge
+/// of an obstacle.
 fn move_waypoint(checker: &mut Checker<'_>, limits: &JointLimits, waypoints: &mut [JointVector], rng: &mut Pcg64Mcg) {
-    /// Largest movement of a joint, as its duration at full speed, s.
+    /// Maximum movement of a joint, as its duration at full speed, s.
     const MAX_MOVE_SECS: f64 = 0.3;
-    /// Number of points compared by cost; only the best is checked for collisions.
+    /// Number of points that are compared by cost. Only the best one is checked for collisions.
     const NUM_PLACES: usize = 16;
     if waypoints.len() <= 2 {
         return;
@@ -86,7 +87,7 @@ fn move_waypoint(checker: &mut Checker<'_>, limits: &JointLimits, waypoints: &mu
     }
 }
 
-/// From each waypoint straight to the last waypoint that can be reached in this way.
+/// Skips waypoints: from each waypoint, the path goes straight to the last waypoint that can be reached in this way.
 fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
     let mut kept = vec![waypoints[0]];
     let mut at = 0;
@@ -101,7 +102,7 @@ fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
     *waypoints = kept;
 }
 
-/// The motion at a time, given by its start waypoint, and the configuration then.
+/// The motion at a time, given by its start waypoint, and the configuration at that time.
 fn place(waypoints: &[JointVector], limits: &JointLimits, mut secs: f64) -> (usize, JointVector) {
     for (index, pair) in waypoints.windows(2).enumerate() {
         let duration_secs = motion_secs(&pair[0], &pair[1], limits);

@@ -1,4 +1,4 @@
-//! Whether a motion satisfies its limits everywhere.
+//! Checks whether a motion satisfies its limits everywhere.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::dynamics::{GRAVITY_M_S2, TcpMotion};
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::rounded_path::RoundedPath;
 
-/// The largest shares of the limits used by a motion.
+/// The largest used fraction of each kind of limit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Worst {
     velocity: f64,
@@ -19,13 +19,13 @@ pub(super) struct Worst {
     torque_stretch: f64,
 }
 
-/// Smaller violations are removed by stretching.
+/// Violations up to this fraction are removed by stretching.
 const TOLERANCE: f64 = 5e-4;
-/// Limits are not lowered below this share of their values.
+/// Limits are not lowered below this fraction of their values.
 const MIN_SHARE: f64 = 0.2;
 
 impl Worst {
-    /// Checks a motion at points that are at most `max_secs` apart, and lowers the limits where it violates one.
+    /// Checks a motion at points that are at most `max_secs` apart, and lowers the limits where it violates them.
     pub(super) fn of(
         path: &RoundedPath,
         profile: &Profile,
@@ -42,7 +42,7 @@ impl Worst {
         let times = places_in_time(path, profile, max_secs);
         for (index, &time) in times.iter().enumerate() {
             let at = profile.at(time);
-            // The jerk jumps at times of the list: its values before and after both count.
+            // The jerk jumps at the times of the list, so its values before and after both count.
             let jerk_after = times.get(index + 1).map_or(0.0, |next| profile.at(0.5 * (time + next)).jerk);
             let point = path.at(at.s);
             let qd = point.dq * at.velocity;
@@ -68,7 +68,7 @@ impl Worst {
 
             let too_much = acceleration.max(torque_stretch.powi(2)).max(1.0);
             let is_by_path = share(&by_path, &joints.jerk_max) > share(&by_profile, &joints.jerk_max);
-            // Slower by k in time: jerks are k³ less, ṡ² and s̈ are k² less.
+            // If time is stretched by k, jerks are k³ lower, and ṡ² and s̈ are k² lower.
             let (less, slower) = match jerk > 1.0 + TOLERANCE {
                 true if is_by_path => (jerk.powf(2.0 / 3.0), jerk.powf(2.0 / 3.0)),
                 true => (jerk, 1.0),
@@ -93,24 +93,26 @@ impl Worst {
         worst
     }
 
-    /// The factor, at least 1, by which time must be stretched so that every limit holds: velocities are divided by it, accelerations by its square, jerks by its cube.
+    /// The factor, at least 1, by which time must be stretched so that every limit holds: it divides velocities; its
+    /// square divides accelerations, its cube jerks.
     pub(super) fn stretch(&self) -> f64 {
         self.velocity.max(self.acceleration.sqrt()).max(self.jerk.cbrt()).max(self.torque_stretch)
     }
 
-    /// Whether the change of the acceleration from one side to the other is too quick.
+    /// Whether the acceleration changes too fast from one extreme to the other.
     pub(super) fn is_jump(&self) -> bool {
         self.jerk > JUMP_JERK
     }
 }
 
-/// Corners add less than this to the jerk of a starting or ending acceleration, as a share of the limit; a change from
-/// one side to the other has twice the limit.
+/// Maximum jerk that corners add to the start or end of an acceleration, as a fraction of the limit. A change from one
+/// extreme to the other has twice the limit.
 const JUMP_JERK: f64 = 1.3;
 
-/// Times at most `max_secs` apart, among them those just before and after the third derivative of the path or the jerk of the profile jumps.
+/// Times that are at most `max_secs` apart, including those just before and just after a jump of the path's third
+/// derivative or of the profile's jerk.
 fn places_in_time(path: &RoundedPath, profile: &Profile, max_secs: f64) -> Vec<f64> {
-    /// Distance from a jump of the third derivative at which it is evaluated, s.
+    /// Time from a jump of the third derivative at which that derivative is evaluated, s.
     const BESIDE_SECS: f64 = 1e-7;
     let mut times = profile.times(max_secs);
     for piece in path.pieces().iter().filter(|piece| !piece.is_straight()) {
@@ -137,7 +139,7 @@ fn tcp_shares(limits: &MotionLimits<'_>, tcp: &TcpMotion) -> [f64; 2] {
     ]
 }
 
-/// By differences over the time between two points.
+/// The tcp's jerk as a fraction of its limit, by the difference between two points in time.
 fn tcp_jerk_share(limits: &MotionLimits<'_>, before: &TcpMotion, now: &TcpMotion, secs: f64) -> f64 {
     if secs < MIN_DIFFERENCE_SECS {
         return 0.0;
@@ -147,12 +149,12 @@ fn tcp_jerk_share(limits: &MotionLimits<'_>, before: &TcpMotion, now: &TcpMotion
         .max(rate(&before.angular_acceleration, &now.angular_acceleration) / limits.cartesian.angular_jerk_rad_s3)
 }
 
-/// Points closer together in time give differences of rounding errors only.
+/// Minimum time between two points for a difference; with less time, differences are only rounding errors.
 const MIN_DIFFERENCE_SECS: f64 = 1e-6;
 
 /// The factor by which time must be stretched for the torques at one point; 1 if they are within their limits.
 fn torque_stretch(limits: &MotionLimits<'_>, q: &JointVector, qd: &JointVector, torques: &JointVector) -> f64 {
-    /// The step of the search for the stretching, and its maximum.
+    /// Step of the search for the factor.
     const STEP: f64 = 1.002;
     const MAX_STRETCH: f64 = 10.0;
     let friction = limits.dynamics.damping().component_mul(qd);

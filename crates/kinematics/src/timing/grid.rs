@@ -1,7 +1,7 @@
-//! Limits along a path, as linear constraints on s̈ and ṡ² at points of it.
+//! Limits along a path, as linear constraints on s̈ and ṡ² at points of the path.
 //!
-//! With `q̈ = q' s̈ + q'' ṡ²` accelerations are linear in (s̈, ṡ²), and so are torques without friction:
-//! `τ = M q' s̈ + (M q'' + C(q, q') q') ṡ² + g`. Speeds bound ṡ² alone.
+//! Because of `q̈ = q' s̈ + q'' ṡ²`, accelerations are linear in (s̈, ṡ²), and so are torques without friction: `τ = M
+//! q' s̈ + (M q'' + C(q, q') q') ṡ² + g`. Speeds only bound ṡ².
 
 use super::limits::MotionLimits;
 use crate::dynamics::GRAVITY_M_S2;
@@ -10,14 +10,15 @@ use crate::joints::{JointVector, NUM_JOINTS};
 use crate::path::PathPoint;
 use crate::rounded_path::RoundedPath;
 
-/// The longest part of a piece, s at full speed, and the minimum number of parts.
+/// Maximum length of a part of a piece, s at full speed.
 const MAX_PART: f64 = 0.025;
+/// Minimum number of parts of a piece.
 const MIN_CORNER_PARTS: usize = 32;
 const MIN_STRAIGHT_PARTS: usize = 6;
-/// Share of the jerk limits that the path's third derivative may take.
+/// Fraction of the jerk limits that the path's third derivative may use.
 const CURVATURE_JERK_SHARE: f64 = 0.9;
 
-/// Bounds ṡ where all joints reverse at once and no other limit applies.
+/// Upper bound of ṡ where all joints reverse at the same point and no other limit applies.
 const MAX_SPEED: f64 = 100.0;
 
 /// `low ≤ slope · s̈ + curvature · ṡ² ≤ high` at one point.
@@ -37,20 +38,20 @@ pub(super) struct Place {
     /// Position on the path.
     pub(super) s: f64,
     pub(super) rows: [Row; NUM_ROWS],
-    /// Upper bound of ṡ² by the speeds of joints and tcp and by the path's third derivative.
+    /// Upper bound of ṡ² from the speeds of joints and tcp and from the path's third derivative.
     pub(super) max_squared: f64,
 }
 
-/// Points along a path, the first at its start, the last at its end.
+/// Points along a path, from its start to its end.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     pub(super) places: Vec<Place>,
 }
 
-/// Limits lowered on parts of the path where a pass violated them.
+/// Limits that are lowered on parts of the path where a pass violated them.
 #[derive(Debug, Clone)]
 pub(super) struct Tightening {
-    /// Remaining share of accelerations and torques between a point and the next.
+    /// Remaining fraction of accelerations and torques between a point and the next.
     pub(super) shares: Vec<f64>,
     /// Upper bound of ṡ² at a point.
     pub(super) max_squared: Vec<f64>,
@@ -61,7 +62,7 @@ impl Grid {
         Self::finer(path, limits, 1)
     }
 
-    /// As [`Grid::new`] with this many times the parts.
+    /// Like [`Grid::new`], with `times` as many parts.
     pub(super) fn finer(path: &RoundedPath, limits: &MotionLimits<'_>, times: usize) -> Result<Self, KinematicsError> {
         let mut places: Vec<Place> = Vec::new();
         for piece in path.pieces() {
@@ -71,7 +72,7 @@ impl Grid {
                 let along = piece.length * part as f64 / num_parts as f64;
                 let place = Place::new(piece.from + along, &piece.at(along), limits)?;
                 match places.last_mut() {
-                    // Where two pieces meet only the third derivative differs.
+                    // Where two pieces meet, only the third derivative differs.
                     Some(last) if part == 0 => last.max_squared = last.max_squared.min(place.max_squared),
                     _ => places.push(place),
                 }
@@ -87,7 +88,7 @@ impl Place {
         let PathPoint { q, dq, ddq, dddq } = point;
         let placed = dynamics.placed(q);
         let zero = JointVector::zeros();
-        // Treated as accelerations from rest, q' gives M q' and the tcp's J q'.
+        // If q' is treated as an acceleration from rest, the results are M q' and J q' of the tcp.
         let (torque_slope, tcp) = dynamics.of_motion(&placed, &zero, dq, 0.0);
         let (torque_curvature, _) = dynamics.of_motion(&placed, dq, ddq, 0.0);
         let (gravity, _) = dynamics.of_motion(&placed, &zero, &zero, GRAVITY_M_S2);
@@ -111,7 +112,8 @@ impl Place {
             if low >= 0.0 || high <= 0.0 {
                 let (max, found) = (joints.torque_max[joint], gravity[joint].abs());
                 let reason = format!(
-                    "joint {} has {max:.0} N·m, and needs {found:.1} N·m to hold arm and load and {friction:.1} N·m against its friction",
+                    "joint {} has {max:.0} N·m, but needs {found:.1} N·m to hold arm and load, and {friction:.1} N·m \
+                     for its friction",
                     joint + 1
                 );
                 return Err(KinematicsError::Trajectory { reason });
@@ -124,7 +126,7 @@ impl Place {
 }
 
 impl Tightening {
-    /// The unchanged limits.
+    /// No lowered limits.
     pub(super) fn none(grid: &Grid) -> Self {
         Self {
             shares: vec![1.0; grid.places.len() - 1],

@@ -1,4 +1,4 @@
-//! The limits of a motion, together.
+//! All limits of a motion.
 
 use crate::dynamics::ArmDynamics;
 use crate::limits::{CartesianLimits, JointLimits};

@@ -1,16 +1,16 @@
-//! The quickest timing along a rounded path: `s(t)` from rest to rest within all limits.
+//! The fastest timing along a rounded path: `s(t)` from rest to rest within all limits.
 //!
 //! ```text
-//! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all holds
+//! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all limits are kept
 //!               ▲                                                                        │
-//!               └──────────────── limits lowered where the mean breaks one ◄─────────────┘
+//!               └──────────────── limits lowered where the mean violates one ◄───────────┘
 //! ```
 //!
-//! Without a jerk limit the time optimum along a path is known up to its grid (phase_plane.rs). s̈ has jumps there. Its
-//! mean over a moving time window (profile.rs) has jerks of at most the jump divided by the window's length, stays on
-//! the path, and takes longer only by that length: 2 or 4 ms with Franka's limits. Limits that the mean violates,
-//! mainly in corners, are lowered there for another pass; remaining violations are removed by stretching the time of
-//! the whole motion.
+//! Without a jerk limit, the time optimum along a path is known up to the resolution of its grid (phase_plane.rs), but
+//! s̈ jumps. The mean of s̈ over a moving time window (profile.rs) has jerks of at most the jump divided by the
+//! window's length, stays on the path, and takes longer only by that length: 2 or 4 ms with Franka's limits. Limits
+//! that the mean violates, mainly in corners, are lowered there for another pass; remaining violations are removed by
+//! stretching the time of the whole motion.
 
 mod check;
 mod grid;
@@ -30,17 +30,17 @@ use crate::rounded_path::RoundedPath;
 #[derive(Debug, Clone)]
 pub(crate) struct Timing {
     pub(crate) profile: Profile,
-    /// Time of the motion divided by that of the profile.
+    /// Duration of the motion divided by the duration of the profile.
     pub(crate) stretch: f64,
-    /// The time optimum without a jerk limit, s.
+    /// Duration of the time optimum without a jerk limit, s.
     pub(crate) jerkless_secs: f64,
 }
 
 /// Maximum number of passes with lowered limits; most motions need three or four.
 const MAX_PASSES: usize = 6;
-/// Limits violated by less than this share are left to the stretching.
+/// Limits violated by less than this fraction are left to the stretching.
 const TOLERANCE: f64 = 1e-3;
-/// Longest time between checked points, s.
+/// Maximum time between checked points, s.
 const COARSE_SECS: f64 = 4e-3;
 const FINE_SECS: f64 = 1e-3;
 /// Margin between the checked maximum and the limit, for values between checked points.
@@ -54,7 +54,7 @@ pub(crate) fn time(path: &RoundedPath, limits: &MotionLimits<'_>) -> Result<Timi
     let grid = Grid::new(path, limits)?;
     let mut tightening = Tightening::none(&grid);
     let ramp_secs = limits.joints.acceleration_max.component_div(&limits.joints.jerk_max).max();
-    // From zero to the full acceleration; twice as long for a change from one side to the other.
+    // The time from zero to the full acceleration; twice as long for a change from one extreme to the other.
     let mut window_secs = ramp_secs;
     let mut jerkless_secs = None;
     let mut best: Option<(f64, Profile)> = None;

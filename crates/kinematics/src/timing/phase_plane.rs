@@ -1,11 +1,12 @@
 //! The time optimum along a path without a jerk limit.
 //!
-//! Backwards from rest at the end: at each point the largest ṡ² from which the end can be reached. Forwards from rest
+//! Backwards from rest at the end: at each point, the largest ṡ² from which the end can be reached. Forwards from rest
 //! at the start: always the largest s̈ that stays below it. Constraints hold at both ends of a part.
 //!
 //! # Source
-//! H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE Transactions on Robotics 2018.
-//! The linear programs have two variables; the largest ṡ² is found by Newton's method from above on a concave piecewise linear function.
+//! H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
+//! Transactions on Robotics 2018. The linear programs have two variables; the largest ṡ² is found by Newton's method
+//! from above on a concave piecewise linear function.
 
 use super::grid::{Grid, NUM_ROWS, Row, Tightening};
 use crate::error::KinematicsError;
@@ -14,22 +15,22 @@ use crate::error::KinematicsError;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phase {
     pub(super) length: f64,
-    /// ṡ at its start and its end.
+    /// ṡ at the start and at the end.
     pub(super) speeds: [f64; 2],
 }
 
-/// Constraints between a point and the next: those of both ends, and those that the next one allows.
+/// Constraints between a point and the next: those of both ends, and the bound of ṡ² at the end.
 struct Part {
     rows: [Row; 2 * NUM_ROWS + 1],
     length: f64,
 }
 
-/// A line of a bound on s̈: its value and its slope by ṡ².
+/// A bound on s̈ that is linear in ṡ²: its value and its slope.
 type Bound = (f64, f64);
 
-/// Smaller slopes bound ṡ² alone.
+/// A row with a smaller slope only bounds ṡ².
 const FLAT: f64 = 1e-9;
-/// Empty intervals of s̈ smaller than this count as single values.
+/// Empty intervals of s̈ smaller than this are rounding errors of a single value.
 const ROUNDING: f64 = 1e-10;
 const MAX_STEPS: usize = 60;
 
@@ -52,7 +53,7 @@ pub(super) fn fastest(grid: &Grid, tightening: &Tightening) -> Result<Vec<Phase>
         let ([_, (acceleration, _)], _) = part.bounds(squared);
         let next = (squared + 2.0 * part.length * acceleration).clamp(0.0, most[index + 1]);
         if squared + next <= 0.0 {
-            let reason = format!("the arm cannot leave {:.1} % of the way within its limits", {
+            let reason = format!("the arm cannot continue after {:.1} % of the path within its limits", {
                 let end = grid.places[num_parts].s;
                 100.0 * grid.places[index].s / end
             });
@@ -73,19 +74,19 @@ impl Part {
             rows[row] = Row { low: at.low * share, high: at.high * share, ..*at };
         }
         for (row, at) in next.rows.iter().enumerate() {
-            // At the end ṡ² is larger by twice the length times s̈.
+            // At the end, ṡ² is larger by twice the length times s̈.
             let slope = at.slope + 2.0 * length * at.curvature;
             rows[NUM_ROWS + row] = Row { slope, curvature: at.curvature, low: at.low * share, high: at.high * share };
         }
         Self { rows, length }
     }
 
-    /// Upper bound of ṡ² at the end.
+    /// Adds an upper bound of ṡ² at the end.
     fn end_below(&mut self, squared: f64) {
         self.rows[2 * NUM_ROWS].high = squared;
     }
 
-    /// The bounds on s̈ at a ṡ², low and high, and the maximum allowed by the rows that bound ṡ² alone.
+    /// The lower and the upper bound on s̈ at a ṡ², and the maximum ṡ² of the rows that only bound ṡ².
     fn bounds(&self, squared: f64) -> ([Bound; 2], f64) {
         let (mut low, mut high) = ((f64::NEG_INFINITY, 0.0), (f64::INFINITY, 0.0));
         let mut most = f64::INFINITY;
@@ -119,7 +120,7 @@ impl Part {
             if gap >= -ROUNDING {
                 return squared;
             }
-            // The gap is concave: its tangent reaches zero no earlier than the gap itself.
+            // The gap is concave, so its tangent does not reach zero before the gap itself does.
             let rate = high.1 - low.1;
             if rate >= 0.0 {
                 return 0.0;

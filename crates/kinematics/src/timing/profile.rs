@@ -1,11 +1,11 @@
-//! `s(t)` whose second derivative is the moving average of a piecewise constant one over a time window.
+//! `s(t)` whose second derivative is the moving average of a piecewise constant function over a time window.
 //!
 //! With P the integral of the piecewise quadratic s₀ and w the window's length, the average is `s(t) = (P(t) - P(t -
-//! w)) / w`, its derivatives likewise by s₀, ṡ₀ and s̈₀: exact, and continuous up to s̈.
+//! w)) / w`; its derivatives follow in the same way from s₀, ṡ₀ and s̈₀. The result is exact, and continuous up to s̈.
 
 use super::phase_plane::Phase;
 
-/// `s` and its derivatives by time.
+/// `s` and its derivatives with respect to time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Progress {
     pub(crate) s: f64,
@@ -14,7 +14,7 @@ pub(crate) struct Progress {
     pub(crate) jerk: f64,
 }
 
-/// From rest at 0 to rest at the path's end.
+/// A profile from rest at 0 to rest at the path's end.
 #[derive(Debug, Clone)]
 pub(crate) struct Profile {
     knots: Vec<Knot>,
@@ -28,12 +28,12 @@ struct Knot {
     s: f64,
     velocity: f64,
     acceleration: f64,
-    /// Integral of s up to here.
+    /// Integral of s up to the knot.
     integral: f64,
 }
 
 impl Knot {
-    /// The integral of s, s, ṡ and s̈ at this time after the knot.
+    /// The integral of s, and s, ṡ and s̈, at this time after the knot.
     fn after(&self, secs: f64) -> [f64; 4] {
         let Self { s, velocity, acceleration, integral, .. } = *self;
         [
@@ -65,7 +65,7 @@ impl Profile {
         self.knots[self.knots.len() - 1].time + self.window_secs
     }
 
-    /// Before the start and after the end it is at rest.
+    /// The state at a time; at rest before the start and after the end.
     pub(crate) fn at(&self, time: f64) -> Progress {
         let [integral, s, velocity, acceleration] = self.before_mean(time);
         let [integral_before, s_before, velocity_before, acceleration_before] =
@@ -79,7 +79,7 @@ impl Profile {
         }
     }
 
-    /// Times between which the jerk is constant, divided so that none are further apart than `max_secs`.
+    /// Times between which the jerk is constant, with further ones so that no two are more than `max_secs` apart.
     pub(super) fn times(&self, max_secs: f64) -> Vec<f64> {
         let mut jumps: Vec<f64> =
             self.knots.iter().flat_map(|knot| [knot.time, knot.time + self.window_secs]).collect();
@@ -95,7 +95,7 @@ impl Profile {
 
     /// The time at which `s` is reached.
     pub(super) fn time_at(&self, s: f64) -> f64 {
-        /// Number of bisections of a motion's time: an error of less than a nanosecond per minute.
+        /// Number of bisections of a motion's duration: an error of less than a nanosecond per minute.
         const NUM_HALVINGS: usize = 40;
         let (mut before, mut after) = (0.0, self.duration_secs());
         for _ in 0..NUM_HALVINGS {
@@ -109,7 +109,7 @@ impl Profile {
         before
     }
 
-    /// The phases in the average at a time, by index.
+    /// The indices of the phases that the average at a time includes.
     pub(super) fn phases_at(&self, time: f64) -> std::ops::RangeInclusive<usize> {
         let last = self.knots.len() - 2;
         self.index(time - self.window_secs).min(last)..=self.index(time).min(last)

@@ -10,7 +10,7 @@ use crate::rounded_path::length_secs;
 use crate::test_poses::random_configuration;
 use crate::trajectory::Trajectory;
 
-/// Through random configurations, with corners of a share of the available space.
+/// A path through random configurations, with corners of a fraction of the available space.
 fn random_path(rng: &mut Pcg64Mcg, share: f64) -> RoundedPath {
     let num_waypoints = rng.random_range(2..=6);
     let reach = rng.random_range(0.05..1.0);
@@ -26,7 +26,7 @@ fn share(values: &JointVector, limits: &JointVector) -> f64 {
     values.abs().component_div(limits).max()
 }
 
-/// The largest share of any limit at samples: joints, jerk by differences, torques.
+/// The largest used fraction of each limit at samples: joint velocity and acceleration, jerk by differences, torques.
 fn largest_shares(motion: &Trajectory, joints: &JointLimits, dynamics: &ArmDynamics) -> [f64; 4] {
     const STEP_SECS: f64 = 1e-3;
     let mut largest = [0.0_f64; 4];
@@ -64,7 +64,7 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
     )
     .unwrap();
     let expected = 2.0 / 2.175 + 2.175 / 15.0 + 15.0 / 7500.0;
-    // The grid's last part before full speed, and the margin.
+    // The tolerance covers the grid's last part before full speed, and the margin.
     assert!((motion.duration_secs() / expected - 1.0).abs() < 2e-3, "{} of {expected}", motion.duration_secs());
 }
 
@@ -167,8 +167,8 @@ fn a_pass_keeps_its_rows_and_leaves_no_room() {
             }
             num_slack += usize::from(room > 0.01);
         }
-        // Some limit is reached everywhere except on the part where the two passes meet and on one before each point
-        // that bounds the speed.
+        // Some limit is reached everywhere, except on the part where the two passes meet and on one part before each
+        // point that bounds the speed.
         assert!(num_slack * 8 < phases.len(), "{num_slack} of {}", phases.len());
         let slowest_joint: f64 = length_secs(path.start(), path.end());
         assert!(secs > slowest_joint, "nothing is quicker than full speed all the way");

@@ -8,11 +8,11 @@ use crate::joints::ready_pose;
 use crate::path::LineOptions;
 use crate::test_poses::{random_configuration, top_grasp};
 
-/// Rounding of the profiles.
+/// Tolerance for rounding errors of the profiles.
 const LIMIT_TOLERANCE: f64 = 1e-6;
 
-/// Checks `num` + 1 samples: limits hold, the derivatives belong to the positions, jerk by differences of
-/// accelerations.
+/// Checks `num` + 1 samples: the limits hold, and the derivatives match the positions; the jerk is computed from
+/// differences of accelerations.
 fn assert_within_limits(trajectory: &Trajectory, limits: &JointLimits, num: usize) {
     let step = trajectory.duration_secs() / num as f64;
     let samples: Vec<State> = (0..=num).map(|i| trajectory.sample(step * i as f64)).collect();
@@ -25,8 +25,8 @@ fn assert_within_limits(trajectory: &Trajectory, limits: &JointLimits, num: usiz
         let jerk = (pair[1].2 - pair[0].2) / step;
         let used = share(&jerk, &limits.jerk_max);
         assert!(used < 1.0 + 1e-3, "jerk {used}");
-        // With a jerk below j the trapezoid rule has an error of at most j·step²/12 for velocities, and similarly for
-        // positions.
+        // With a jerk below j, the trapezoid rule has an error of at most j·step²/12 for velocities, and a similar one
+        // for positions.
         let bound = limits.jerk_max * step.powi(2);
         let velocity_error = (pair[1].1 - pair[0].1) - (pair[0].2 + pair[1].2) * (step / 2.0);
         assert!(share(&velocity_error, &bound) < 1.0);
@@ -121,7 +121,7 @@ fn from_motion_keeps_the_limits_and_starts_as_told() {
             Err(error) => panic!("{error}"),
         }
     }
-    // The others cannot stop inside the position limits.
+    // The other motions cannot stop inside the position limits.
     assert!(num_found > 250, "{num_found} of 300");
 }
 
@@ -167,14 +167,15 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
         }
         shortest_share = shortest_share.min(max_used);
     }
-    // Some limit is reached, otherwise the motion would be slower than necessary (jerk, which can be the only limit, is
-    // not counted here).
+    // Some limit is reached, or else the motion would be slower than necessary. The jerk, which can be the only limit,
+    // is not counted in this test.
     assert!(shortest_share > 0.7, "{shortest_share}");
 }
 
 #[test]
 fn a_low_jerk_limit_binds_and_holds_on_a_curved_path() {
-    // At a five-hundredth of Franka's jerk the acceleration limits are not reached, and the path's curvature matters.
+    // At a five-hundredth of Franka's jerk, the acceleration limits are not reached, and the path's curvature has an
+    // effect.
     let panda = ArmGeometry::panda();
     let limits = panda.limits.scaled(1.0, 1.0, 0.002).unwrap();
     let start = top_grasp(0.4, 0.2, 0.3, 0.5);

@@ -1,4 +1,4 @@
-//! The frame of all plots: title, legend, the drawings for every width, caption.
+//! The frame of all plots: title, legend, the drawings of all widths, caption.
 
 use crate::html::escape;
 

@@ -8,14 +8,14 @@ const SIZES: [(f64, &str); 3] = [(320.0, "narrow"), (440.0, "medium"), (720.0, "
 const ROW_HEIGHT: f64 = 30.0;
 /// Gap between neighbouring cells.
 const GAP: f64 = 3.0;
-/// Mean width of a letter in labels.
+/// Mean width of a letter in labels, in pixels.
 const LETTER_WIDTH: f64 = 6.4;
-/// Sine and cosine of the angle of headings that do not fit over their columns.
+/// Sine and cosine of the angle of headings that are wider than their columns.
 const SLANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Minimum shade of a cell with a count, so that it is visible.
 const MIN_SHADE: f64 = 0.16;
 
-/// Counts in rows and columns, drawn as shaded cells: for example a confusion matrix.
+/// Counts in rows and columns, drawn as shaded cells, for example a confusion matrix.
 ///
 /// ```
 /// use sdg_report::Matrix;
@@ -42,7 +42,7 @@ impl Matrix {
         Self { title: title.into(), columns, good_column: None, rows: Vec::new(), caption: None }
     }
 
-    /// The column of successes; the others are shaded as failures.
+    /// Sets the column of successes; the others are shaded as failures.
     #[must_use]
     pub fn good_column(mut self, column: usize) -> Self {
         self.good_column = Some(column);
@@ -58,7 +58,7 @@ impl Matrix {
         self
     }
 
-    /// Text under the matrix.
+    /// Sets the text below the matrix.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = Some(caption.into());
@@ -76,7 +76,7 @@ impl Matrix {
         };
         let longest_heading = longest(&mut self.columns.iter());
         let left = longest(&mut self.rows.iter().map(|(label, _)| label)).min(0.45 * width) + 10.0;
-        // Slanted headings extend over the right edge of their column.
+        // Slanted headings extend beyond the right edge of their column.
         let fits = |room: f64| longest_heading + 8.0 <= room / self.columns.len().max(1) as f64;
         let slanted = !fits(width - left);
         let right = if slanted { width - SLANT * longest_heading * 0.55 } else { width };
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn the_shade_grows_with_the_share() {
         let svg = matrix().to_svg(720.0, "wide");
-        // 9 of 10 and 1 of 10: 0.16 + 0.84 · share.
+        // 9 of 10 and 1 of 10: 0.16 + 0.84 · fraction.
         assert!(svg.contains("fill-opacity=\"0.92\"") && svg.contains("fill-opacity=\"0.24\""), "{svg}");
     }
 

@@ -1,4 +1,5 @@
-//! Plots: line charts here (the data, not the drawing), matrices of counts and shares in the other files.
+//! Plots: the data of line charts in this file; their drawing, matrices of counts and charts of fractions in the
+//! others.
 
 mod frame;
 mod matrix;
@@ -26,21 +27,21 @@ impl Axis {
         Self { label: label.into(), unit: None, scale: Scale::Linear, from_zero: false }
     }
 
-    /// The same axis with a unit, such as `mm`.
+    /// Sets the unit, such as `mm`.
     #[must_use]
     pub fn unit(mut self, unit: impl Into<String>) -> Self {
         self.unit = Some(unit.into());
         self
     }
 
-    /// The same axis with a logarithmic scale; for errors that fall by orders of magnitude.
+    /// Makes the scale logarithmic, for errors that decrease by orders of magnitude.
     #[must_use]
     pub fn logarithmic(mut self) -> Self {
         self.scale = Scale::Logarithmic;
         self
     }
 
-    /// The same axis, starting at zero unless a value is below.
+    /// Starts the axis at zero, unless a value is below zero.
     #[must_use]
     pub fn from_zero(mut self) -> Self {
         self.from_zero = true;
@@ -65,20 +66,20 @@ pub struct Series {
 }
 
 impl Series {
-    /// A curve through points (x, y), in the order given.
+    /// A curve through points (x, y), in the given order.
     #[must_use]
     pub fn new(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.into(), points, noisy: false, markers: false }
     }
 
-    /// The same curve drawn faintly, with a running mean on top: for the loss of each step.
+    /// Draws the curve faintly, with a running mean on top: for the loss of each step.
     #[must_use]
     pub fn noisy(mut self) -> Self {
         self.noisy = true;
         self
     }
 
-    /// The same curve with a dot at each point: for few measurements.
+    /// Draws a dot at each point: for few measurements.
     #[must_use]
     pub fn with_markers(mut self) -> Self {
         self.markers = true;
@@ -94,7 +95,8 @@ impl Series {
                 if !y.is_finite() {
                     return (x, y);
                 }
-                // Towards the ends the window narrows on both sides; otherwise the mean would be biased inwards.
+                // Towards the ends, the window becomes narrower on both sides; otherwise the mean would be biased
+                // inwards.
                 let reach = reach.min(at).min(self.points.len() - 1 - at);
                 let window = &self.points[at - reach..=at + reach];
                 let (sum, count) = window
@@ -107,7 +109,7 @@ impl Series {
     }
 }
 
-/// Curves over common axes, with an optional limit and an optional moment.
+/// Curves with common axes, with an optional limit and an optional moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     pub(crate) title: String,
@@ -126,14 +128,14 @@ impl Chart {
         Self { title: title.into(), caption: None, x_axis, y_axis, series: Vec::new(), limit: None, moment: None }
     }
 
-    /// Adds a curve. There are four colours; a chart with more curves should be split.
+    /// Adds a curve. There are four colours; a chart with more curves should be divided.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// Draws a horizontal line at a value, such as the largest error that still grasps.
+    /// Draws a horizontal line at a value, such as the largest error with which a grasp succeeds.
     #[must_use]
     pub fn limit(mut self, y: f64, label: impl Into<String>) -> Self {
         self.limit = Some((y, label.into()));
@@ -147,7 +149,7 @@ impl Chart {
         self
     }
 
-    /// Text under the chart.
+    /// Sets the text below the chart.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = Some(caption.into());

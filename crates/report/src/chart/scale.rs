@@ -20,7 +20,7 @@ pub(super) struct FittedScale {
 }
 
 impl FittedScale {
-    /// Spans the finite values; with `from_zero`, a linear axis starts at zero if no value is below it.
+    /// Fits the axis to the finite values. With `from_zero`, a linear axis starts at zero unless a value is below zero.
     pub(super) fn fit(scale: Scale, values: impl Iterator<Item = f64>, from_zero: bool, tight: bool) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for value in values.filter(|&value| is_drawable(scale, value)) {
@@ -43,12 +43,12 @@ impl FittedScale {
         if from_zero && low > 0.0 {
             low = 0.0;
         }
-        // A span below the values' rounding cannot be divided into ticks.
+        // A span smaller than the rounding errors of the values cannot be divided into ticks.
         if high - low <= 1e-9 * low.abs().max(high.abs()).max(1e-300) {
             let room = if high == 0.0 { 1.0 } else { 0.5 * high.abs() };
             (low, high) = (low - room, high + room);
         }
-        // Halved first, because the difference of two huge values may overflow.
+        // Divided before the subtraction, because the difference of two huge values may overflow.
         let step = round_step((high / 5.0 - low / 5.0).abs());
         if !step.is_finite() || step <= 0.0 {
             return Self { scale: Scale::Linear, low, high, ticks: Vec::new() };
@@ -65,7 +65,7 @@ impl FittedScale {
     fn logarithmic(low: f64, high: f64) -> Self {
         let ratio = high / low;
         let (low, high) = if ratio < 1.0 + 1e-9 { (low / 2.0, high * 2.0) } else { (low, high) };
-        // Up to three decades, 1, 2 and 5 of each have ticks; above, every decade or every few.
+        // Up to three decades, there are ticks at 1, 2 and 5 of each; with more decades, at every decade or every few.
         let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
         let factors: &[f64] = if last - first <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let stride = ((last - first) / 6).max(1) as usize;
@@ -79,7 +79,7 @@ impl FittedScale {
         Self { scale: Scale::Logarithmic, low, high, ticks }
     }
 
-    /// Position of a value, 0 at the axis's start and 1 at its end; `None` if it cannot be drawn.
+    /// Position of a value, from 0 at the start of the axis to 1 at its end; `None` if the value cannot be drawn.
     pub(super) fn place(&self, value: f64) -> Option<f64> {
         if !is_drawable(self.scale, value) {
             return None;

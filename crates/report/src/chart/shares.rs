@@ -1,4 +1,4 @@
-//! Shares with their confidence intervals, one below the other.
+//! Fractions with their confidence intervals, one below the other.
 
 use super::frame::framed;
 use crate::html::{escape, format_number};
@@ -8,10 +8,10 @@ const SIZES: [(f64, &str); 3] = [(320.0, "narrow"), (440.0, "medium"), (720.0, "
 const ROW_HEIGHT: f64 = 34.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = 24.0;
-/// Space for the number at the right.
+/// Space for the number at the right, in pixels.
 const RIGHT: f64 = 64.0;
 const LETTER_WIDTH: f64 = 6.6;
-/// Possible starts of the axis, in percent: the largest one below all drawn values.
+/// Possible starts of the axis, in percent: the largest one that is below all drawn values is used.
 const STARTS: [f64; 4] = [0.0, 50.0, 80.0, 90.0];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ struct ShareRow {
     reference: Option<f64>,
 }
 
-/// Shares in percent as dots with whiskers, each compared with a reference.
+/// Fractions in percent as dots with whiskers, each compared with a reference value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShareChart {
     title: String,
@@ -38,14 +38,14 @@ impl ShareChart {
         Self { title: title.into(), rows: Vec::new(), reference_name: None, caption: None }
     }
 
-    /// Sets the legend of the hollow marks.
+    /// Sets the name of the reference in the legend.
     #[must_use]
     pub fn reference_name(mut self, name: impl Into<String>) -> Self {
         self.reference_name = Some(name.into());
         self
     }
 
-    /// Adds a share, its interval and its reference, all in percent. A share that is not finite is left out.
+    /// Adds a fraction, its interval and its reference, all in percent. A fraction that is not finite is left out.
     #[must_use]
     pub fn row(mut self, label: impl Into<String>, percent: f64, interval: [f64; 2], reference: Option<f64>) -> Self {
         if percent.is_finite() && interval.iter().all(|bound| bound.is_finite()) {
@@ -55,7 +55,7 @@ impl ShareChart {
         self
     }
 
-    /// Text under the chart.
+    /// Sets the text below the chart.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = Some(caption.into());
@@ -124,7 +124,7 @@ impl ShareChart {
         svg + "</svg>"
     }
 
-    /// The shares in words, for screen readers.
+    /// The fractions in words, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}.", self.title);
         for ShareRow { label, percent, interval: [low, high], reference } in &self.rows {

@@ -1,7 +1,7 @@
 //! A chart as inline SVG.
 //!
 //! Each chart is drawn in three widths, and the page's style shows the one that fits: scaling a single drawing would
-//! make its text too small on a phone or too large on a desktop. Colours are the page's variables, so that the chart
+//! make its text too small on a phone or too large on a desktop. Colours are variables of the page, so that the chart
 //! follows the theme.
 
 use super::frame::framed;
@@ -14,17 +14,17 @@ const SIZES: [(f64, f64, &str); 3] = [(320.0, 220.0, "narrow"), (430.0, 260.0, "
 const TOP: f64 = 30.0;
 const BOTTOM: f64 = 38.0;
 const RIGHT: f64 = 14.0;
-/// Width of a digit at the size of tick labels.
+/// Width of a digit in tick labels, in pixels.
 const DIGIT_WIDTH: f64 = 7.0;
-/// Mean width of a letter in notes.
+/// Mean width of a letter in notes, in pixels.
 const LETTER_WIDTH: f64 = 6.2;
-/// Colours of curves in the style sheet.
+/// Number of colours for curves in the style sheet.
 const NUM_COLORS: usize = 4;
 
 impl Chart {
     /// The complete figure: title, legend, drawings, caption.
     pub(crate) fn to_html(&self) -> String {
-        // A single curve is named too, so that the plots of neighbouring charts are aligned.
+        // A single curve has a legend as well, so that the plots of neighbouring charts are aligned.
         let entries = self.series.iter().enumerate().map(|(order, series)| {
             let color = order % NUM_COLORS + 1;
             format!("<li><i class=\"swatch s{color}\"></i>{}</li>", escape(&series.name))
@@ -39,7 +39,7 @@ impl Chart {
 
     fn to_svg(&self, width: f64, height: f64, class: &str) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points);
-        // A point affects the axes only if it can be drawn on both.
+        // A point affects the axes only if it can be drawn on both of them.
         let both = || points().filter(|(x, y)| x.is_finite() && y.is_finite());
         let x_scale = FittedScale::fit(
             self.x_axis.scale,
@@ -86,7 +86,7 @@ impl Chart {
         svg + "</svg>"
     }
 
-    /// One sentence for screen readers.
+    /// The chart in one sentence, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}: {} over {}.", self.title, self.y_axis.title(), self.x_axis.title());
         for series in &self.series {
@@ -115,7 +115,7 @@ impl Chart {
         let x_labels = tick_labels(&plot.x_scale.ticks, &self.x_axis);
         for (&tick, label) in plot.x_scale.ticks.iter().zip(&x_labels) {
             let Some(x) = plot.x(tick) else { continue };
-            // A label at the edge would be cut off; it is moved inside.
+            // A label that would extend beyond the edge is moved inside.
             let half = 0.5 * DIGIT_WIDTH * label.chars().count() as f64;
             let text_x = x.min(width - half - 1.0);
             svg += &format!(
@@ -138,7 +138,7 @@ impl Chart {
     fn references(&self, plot: &Plot) -> String {
         let mut svg = String::new();
         if let Some((y, label)) = self.limit.as_ref().and_then(|(y, label)| Some((plot.y(*y)?, label))) {
-            // The label is at the right end, or left of the moment's line if they would cross.
+            // The label is at the right end, or left of the moment's line if they would overlap.
             let label_width = LETTER_WIDTH * label.chars().count() as f64;
             let moment = self.moment.as_ref().and_then(|(x, _)| plot.x(*x));
             let right = match moment {
@@ -193,7 +193,7 @@ impl Plot {
         Some((self.x(point.0)?, self.y(point.1)?))
     }
 
-    /// A path through the points, interrupted where a point cannot be drawn; a dot for an isolated point.
+    /// A path through the points, interrupted at points that cannot be drawn; an isolated point is a dot.
     fn curve(&self, points: &[(f64, f64)], class: &str) -> String {
         let mut path = String::new();
         let mut lone = String::new();
@@ -229,7 +229,7 @@ impl Plot {
     }
 }
 
-/// Keeps the lowest and the highest point of each half pixel, which look the same as all points.
+/// Keeps the lowest and the highest point in each half pixel; the drawing looks the same as with all points.
 fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     let mut column: Vec<(f64, f64)> = Vec::new();
@@ -254,7 +254,7 @@ fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Labels with as many decimals as needed to distinguish the ticks; powers of ten for long numbers.
+/// Labels with as many decimals as the ticks need to be distinguished; powers of ten for long numbers.
 fn tick_labels(ticks: &[f64], axis: &Axis) -> Vec<String> {
     let largest = ticks.iter().fold(0.0f64, |m, t| m.max(t.abs()));
     if axis.scale == Scale::Logarithmic || largest >= 1e6 || (largest > 0.0 && largest < 1e-3) {
@@ -331,7 +331,7 @@ mod tests {
     #[test]
     fn a_curve_starts_and_ends_at_the_corners_of_its_plot() {
         let svg = chart(vec![(0.0, 0.0), (10.0, 10.0)]).to_svg(320.0, 220.0, "narrow");
-        // Labels of two digits: the plot spans x 28 to 306, y 182 to 30.
+        // Labels have two digits: the plot is from x 28 to 306, y 182 to 30.
         assert!(svg.contains("d=\"M28.0 182.0L306.0 30.0\""), "{svg}");
     }
 

@@ -1,4 +1,4 @@
-//! Many small pictures in one.
+//! Arranges many small pictures in one picture.
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};
@@ -9,11 +9,11 @@ const GROUND: image::Rgb<u8> = image::Rgb([28, 30, 34]);
 
 /// Arranges pictures in rows, each scaled into a cell of `cell_width` with the first picture's proportions.
 ///
-/// Pictures of other proportions are centred in their cell. On a page, use a gallery of separate pictures, which adapts
-/// to the screen's width; a sheet is for a single file.
+/// Pictures of other proportions are centred in their cells. On a page, use a gallery of separate pictures, which
+/// adapts to the screen's width; a sheet is a single file.
 ///
 /// # Panics
-/// If `columns` or `cell_width` is zero. Without pictures the sheet is one empty pixel.
+/// If `columns` or `cell_width` is zero. Without pictures, the sheet is one empty pixel.
 #[must_use]
 pub fn contact_sheet(images: &[RgbImage], columns: u32, cell_width: u32) -> RgbImage {
     assert!(columns > 0 && cell_width > 0, "a sheet has columns of some width");
@@ -51,7 +51,7 @@ mod tests {
     fn pictures_stand_in_reading_order() {
         let shade = |value| RgbImage::from_pixel(40, 20, Rgb([value; 3]));
         let sheet = contact_sheet(&[shade(100), shade(150), shade(200)], 2, 20);
-        // Cells of 20 by 10, gaps of 6: 6 + 26 + 26 wide, 6 + 16 + 16 high.
+        // Cells of 20 by 10 and gaps of 6: 6 + 26 + 26 wide, 6 + 16 + 16 high.
         assert_eq!(sheet.dimensions(), (58, 38));
         assert_eq!(sheet.get_pixel(16, 11).0, [100; 3]);
         assert_eq!(sheet.get_pixel(42, 11).0, [150; 3]);

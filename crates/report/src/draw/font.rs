@@ -1,15 +1,15 @@
 //! Text as outlines: DejaVu Sans, reduced to the characters of labels.
 //!
 //! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with the characters of
-//! [`CHARACTERS`], `--no-hinting --layout-features='' --notdef-outline`; its licence is beside it. Other characters are
-//! drawn as a box.
+//! [`CHARACTERS`], `--no-hinting --layout-features='' --notdef-outline`; its licence is in the same folder. Other
+//! characters are drawn as a box.
 
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, OutlineCurve, Point};
 use tiny_skia::{Path, PathBuilder};
 
-/// Characters of the font besides printable ASCII.
+/// Characters of the font in addition to printable ASCII.
 #[cfg(test)]
 const CHARACTERS: &str = "\u{a0}°±µ·×μ–’…→−✓";
 
@@ -20,7 +20,7 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
 /// Depth of descenders below the baseline, relative to the height of capitals.
 pub(super) const DESCENT: f64 = 0.32;
 
-/// Pixels per font unit for capitals of height `cap_height_px`.
+/// Pixels per font unit if capitals have the height `cap_height_px`.
 fn scale(cap_height_px: f64) -> f64 {
     let capital = FONT.outline(FONT.glyph_id('H')).map_or(1.0, |outline| outline.bounds.height().abs());
     cap_height_px / f64::from(capital)
@@ -32,7 +32,7 @@ pub(super) fn text_width(text: &str, cap_height_px: f64) -> f64 {
     scale(cap_height_px) * f64::from(advances)
 }
 
-/// The outlines of a line of text that begins at `left` on a baseline, in pixels; `None` if there is nothing to draw.
+/// The outlines of a line of text that begins at `left` on a baseline, in pixels; `None` for an empty drawing.
 pub(super) fn text_path(text: &str, left: f64, baseline: f64, cap_height_px: f64) -> Option<Path> {
     let scale = scale(cap_height_px) as f32;
     let (mut left, baseline) = (left as f32, baseline as f32);

@@ -1,4 +1,4 @@
-//! Small tags with text.
+//! Draws small tags with text.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -35,7 +35,7 @@ fn padding(height_px: f64) -> f64 {
     (0.45 * height_px).max(2.0)
 }
 
-/// The area of the tag drawn by [`draw_label`], for keeping tags apart.
+/// The area of the tag that [`draw_label`] draws; used to keep tags apart.
 pub fn label_bounds(image: &RgbImage, at: Point2<f64>, text: &str, height_px: f64) -> BoundingBox {
     let padding = padding(height_px);
     let width = text_width(text, height_px) + 2.0 * padding;

@@ -1,4 +1,4 @@
-//! The two kinds of pictures in every report: demonstrations and detections.
+//! Draws demonstrations and detections.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::html::format_number;
 
-/// Result of comparing a detection with the demonstration.
+/// The result of comparing a detection with the demonstration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The demonstration agrees with the image.
@@ -40,7 +40,7 @@ impl Verdict {
     }
 }
 
-/// A detection to draw: all fields but score and verdict are optional.
+/// A detection to draw; all fields except score and verdict are optional.
 #[derive(Debug, Clone, Copy)]
 pub struct DetectionMark<'a> {
     /// The detected box.
@@ -53,14 +53,14 @@ pub struct DetectionMark<'a> {
     pub grasp: Option<PlanarGrasp>,
     /// The final score, 0 to 1.
     pub score: f64,
-    /// Verdict of the verification.
+    /// The verdict of the verification.
     pub verdict: Verdict,
-    /// Number of the part, written before the score.
+    /// Number of the part, which is written before the score.
     pub number: Option<u64>,
 }
 
-/// Line width for a picture's size: 3 pixels at 640 columns, so that marks and tags are readable when three pictures
-/// share a row of the page.
+/// Line width for a picture: 3 pixels at 640 columns, so that marks and tags are readable when a row of the page has
+/// three pictures.
 pub fn line_width(image: &RgbImage) -> f64 {
     (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0)
 }
@@ -91,7 +91,7 @@ pub fn draw_demonstration(
 
 /// Draws a detection: box, outline, keypoints, a tag with score and verdict, and the grasp as a gripper.
 ///
-/// A refused detection has a dashed box and no gripper, because the robot will not go there.
+/// A refused detection has a dashed box and no gripper, because it is not grasped.
 pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
     let width = line_width(image);
     let color = mark.verdict.color();

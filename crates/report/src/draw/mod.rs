@@ -1,8 +1,8 @@
-//! Marks on pictures: boxes, outlines, keypoints, grasps, labels, contact sheets.
+//! Draws marks on pictures: boxes, outlines, keypoints, grasps, labels, contact sheets.
 //!
-//! Coordinates are pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased and have
-//! a dark halo, so that they are visible on bright and dark backgrounds. Parts outside the picture, and coordinates
-//! that are not finite, are left out.
+//! Coordinates are in pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased and
+//! have a dark halo, so that they are visible on bright and dark backgrounds. Parts outside the picture and coordinates
+//! that are not finite are left out.
 
 mod contact_sheet;
 mod font;
@@ -21,11 +21,11 @@ pub use shapes::{draw_box, draw_grasp_jaws, draw_keypoints, draw_line, draw_poly
 pub struct Color(pub [u8; 3]);
 
 impl Color {
-    /// Grasps.
+    /// Colour of grasps.
     pub const GRASP: Self = Self([255, 122, 41]);
-    /// Boxes.
+    /// Colour of boxes.
     pub const BOX: Self = Self([124, 196, 255]);
-    /// Outlines of the part.
+    /// Colour of the part's outlines.
     pub const OUTLINE: Self = Self([255, 224, 102]);
     /// Colour of detections that passed verification.
     pub const VERIFIED: Self = Self([64, 214, 170]);
@@ -48,7 +48,7 @@ pub struct Pen {
     pub color: Color,
     /// Width in pixels.
     pub width: f64,
-    /// Whether a dark rim surrounds the line.
+    /// Whether the line has a dark rim.
     pub halo: bool,
     /// Lengths of dash and gap in pixels; `None` for a continuous line.
     pub dash: Option<(f64, f64)>,
@@ -61,21 +61,21 @@ impl Pen {
         Self { color, width: 2.0, halo: true, dash: None }
     }
 
-    /// The same pen with another width in pixels.
+    /// Sets the width in pixels.
     #[must_use]
     pub fn width(mut self, width: f64) -> Self {
         self.width = width;
         self
     }
 
-    /// The same pen, dashed; lengths of dash and gap in pixels.
+    /// Makes the line dashed; lengths of dash and gap in pixels.
     #[must_use]
     pub fn dashed(mut self, dash: f64, gap: f64) -> Self {
         self.dash = Some((dash, gap));
         self
     }
 
-    /// The same pen without the dark rim.
+    /// Removes the dark rim.
     #[must_use]
     pub fn without_halo(mut self) -> Self {
         self.halo = false;

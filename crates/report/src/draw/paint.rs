@@ -42,8 +42,8 @@ pub(super) fn fill(image: &mut RgbImage, path: Path, rule: FillRule, color: Colo
     }
 }
 
-/// The polygon of the corners, clipped to the picture, because tiny-skia panics on paths far outside. `None` if nothing
-/// is inside, or a corner is not finite.
+/// The polygon of the corners, clipped to the picture, because tiny-skia panics on paths far outside. `None` if no part
+/// is inside, or if a corner is not finite.
 pub(super) fn inside_of(image: &RgbImage, corners: &[Point2<f64>]) -> Option<Path> {
     if corners.len() < 3 || !corners.iter().all(is_finite) {
         return None;
@@ -59,7 +59,7 @@ pub(super) fn inside_of(image: &RgbImage, corners: &[Point2<f64>]) -> Option<Pat
     path.finish()
 }
 
-/// Strokes polylines with a pen, after its halo.
+/// Strokes polylines with a pen, with its halo below.
 pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen) {
     if pen.halo {
         let rim = Pen { color: HALO_COLOR, width: pen.width + 2.0 * HALO_WIDTH, ..*pen };
@@ -68,13 +68,13 @@ pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: 
     stroke_translucent(image, polylines, pen, 1.0);
 }
 
-/// Strokes polylines with a pen and an opacity, with round ends and joints, without a halo. A polyline of length zero
-/// is a dot.
+/// Strokes polylines with a pen and an opacity, with round ends and joints, and without a halo. A polyline of length
+/// zero is a dot.
 pub(super) fn stroke_translucent(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen, opacity: f64) {
     if !(pen.width.is_finite() && pen.width > 0.0) {
         return;
     }
-    // A wider line covers the whole picture as well.
+    // A wider line would cover the whole picture as well.
     let [width, height] = [image.width(), image.height()].map(f64::from);
     let pen = Pen { width: pen.width.min(2.0 * (width + height)), ..*pen };
     let reach = 0.5 * pen.width + 1.0;
@@ -109,7 +109,7 @@ pub(super) fn is_finite(point: &Point2<f64>) -> bool {
     point.x.is_finite() && point.y.is_finite()
 }
 
-/// Clips a segment to a rectangle, by Liang and Barsky.
+/// Clips a segment to a rectangle (Liang and Barsky).
 fn clip(
     a: Point2<f64>,
     b: Point2<f64>,
@@ -145,7 +145,7 @@ fn dash(
     segments: &mut Vec<(Point2<f64>, Point2<f64>)>,
 ) {
     let length = (b - a).norm();
-    // Below half a pixel a pattern is at best grey; a period of zero would never end.
+    // A pattern below half a pixel would at best be grey, and a period of zero would never end.
     let Some((on, off)) = pattern.filter(|&(on, off)| on >= 0.5 && off >= 0.5 && length > 0.0) else {
         segments.push((a, b));
         return;

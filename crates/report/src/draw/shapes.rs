@@ -1,4 +1,4 @@
-//! Lines, boxes, polygons, keypoints and the gripper's jaws.
+//! Draws lines, boxes, polygons, keypoints and the gripper's jaws.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -37,9 +37,9 @@ pub fn shade_polygon(image: &mut RgbImage, polygon: &Polygon, color: Color, opac
     }
 }
 
-/// Draws keypoints: discs for visible, rings for hidden ones, nothing for unlabelled ones.
+/// Draws keypoints: discs for visible ones, rings for hidden ones. Unlabelled ones are not drawn.
 ///
-/// The pen's width is the radius of a disc; its dash is ignored.
+/// The pen's width is the radius of a disc; the dash is ignored.
 pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
     for keypoint in keypoints {
         let center = keypoint.point();
@@ -54,10 +54,10 @@ pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
     }
 }
 
-/// Draws a grasp as a gripper seen from above: two jaws, arrows in their closing direction, a dot at the centre.
+/// Draws a grasp as a gripper seen from above: two jaws, arrows in their closing direction, and a dot at the centre.
 ///
 /// The jaws' inner faces are at the positions of [`PlanarGrasp::jaws`], across the marked line. The arrows are outside,
-/// so that the part between the jaws stays visible.
+/// so that the part between the jaws is visible.
 pub fn draw_grasp_jaws(image: &mut RgbImage, grasp: &PlanarGrasp, pen: &Pen) {
     let center = grasp.center();
     let faces = grasp.jaws();
@@ -118,7 +118,8 @@ mod tests {
     const GREY: Rgb<u8> = Rgb([128, 128, 128]);
     const RED: Color = Color([255, 0, 0]);
 
-    /// The rasteriser computes coverage in about sixteenths, and round ends cover a corner's pixel incompletely.
+    /// The rasteriser computes coverage in steps of about a sixteenth, and round ends cover a corner's pixel
+    /// incompletely.
     const TOLERANCE: u8 = 8;
 
     #[track_caller]
@@ -186,7 +187,8 @@ mod tests {
         let mut image = RgbImage::from_pixel(100, 100, GREY);
         let grasp = PlanarGrasp { x: 50.5, y: 50.5, angle: Angle::ZERO, width: 40.0 };
         draw_grasp_jaws(&mut image, &grasp, &Pen::new(RED).width(1.0).without_halo());
-        // Faces at y = 30.5 and 70.5, 2.4 pixels thick outwards, 14 long to each side; arrows as far as 9 outside.
+        // The faces are at y = 30.5 and 70.5; they are 2.4 pixels thick outwards, and extend 14 to each side; arrows
+        // extend 9 further outwards.
         for (x, y) in [(50, 29), (50, 71), (60, 29), (60, 71), (50, 23)] {
             assert_eq!(image.get_pixel(x, y).0, [255, 0, 0], "({x}, {y})");
         }

@@ -31,7 +31,7 @@ pub struct AnnotateArgs {
     /// is the photo
     ///
     /// Without IMAGE, DIR and --from, the page lists recent projects, and creates a new one in the current folder from
-    /// a photo that is dropped on it
+    /// a photo dropped on it
     #[arg(value_name = "IMAGE[:ANNOTATION] | DIR")]
     pub images: Vec<String>,
     /// Live pictures, for taking photos on the page and for trying the model: v4l:, v4l:/dev/video2, http://HOST/PATH,

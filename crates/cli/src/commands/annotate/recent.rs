@@ -1,4 +1,4 @@
-//! Location of the list of recent projects.
+//! The location of the list of recent projects.
 
 use std::path::{Path, PathBuf};
 

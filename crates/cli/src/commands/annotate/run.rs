@@ -25,7 +25,7 @@ use crate::live_pictures;
 use crate::page_teacher::PageTeacher;
 use crate::web_browser;
 
-/// Locks a file of marks against other processes; `None` where the folder is not writable.
+/// Locks a file of marks against other processes; `None` if the folder is not writable.
 fn lock(written: &Path) -> Result<Option<WriterLock>> {
     WriterLock::take(written).map_err(|error| match error {
         FileError::Held { path, holder } => anyhow!(
@@ -54,7 +54,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             .into());
         }
         let start = Start {
-            // Without a home directory the list of projects lasts as long as the process.
+            // Without a home directory, the list of projects lasts as long as the process.
             recent: recent.unwrap_or_else(|| RecentProjects::at(".sdg-recent-projects.json".into())),
             folder: PathBuf::new(),
             open: opener(preset, camera),
@@ -70,7 +70,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         println!("{}", json!({"url": url}));
     } else {
         println!("mark the grasp at {url}");
-        println!("Ctrl-C ends it; marks are saved as they are made");
+        println!("Ctrl-C ends it; marks are saved immediately");
     }
     if !args.no_browser {
         web_browser::open(&url);
@@ -95,7 +95,7 @@ fn open(
         (Some(_), Some(folder)) => Some(folder.join("photo.png")),
         (Some(_), None) => Some(photo_path(&mut images)?),
     };
-    // Fail now, not after minutes of marking.
+    // Checked here, so that the error does not come after minutes of marking.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
         sdg_files::check_writable(&written.with_extension("json"))?;
     }
@@ -113,7 +113,7 @@ fn open(
     let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in sdg_files::entries(folder)? {
-            // Files beside the pictures are expected and not reported; pictures that cannot be read are.
+            // Other files beside the pictures are expected and not reported, but unreadable pictures are.
             if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
                 let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
                 eprintln!("left out: {why}");
@@ -144,7 +144,7 @@ fn open(
     Ok(session.holding(locks.into_iter().flatten().collect()))
 }
 
-/// Opens the project that is chosen on the page: a folder, or a photo.
+/// Opens the project chosen on the page: a folder or a photo.
 fn opener(preset: Preset, camera: Option<(CameraFile, [f64; 2])>) -> OpenProject {
     Box::new(move |path| {
         let is_folder = path.is_dir();
@@ -164,7 +164,7 @@ fn opener(preset: Preset, camera: Option<(CameraFile, [f64; 2])>) -> OpenProject
     })
 }
 
-/// The hand's maximum opening in pixels at the middle of the photo, in the plane of the marks. It is nearly constant
+/// The hand's maximum opening, in pixels at the centre of the photo, in the plane of the marks. It is nearly constant
 /// over a table that is seen from above.
 fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option<f64> {
     let [width, height] = file.size_px();
@@ -174,7 +174,7 @@ fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option
     Some(HAND_OPENING_MAX_M / scale)
 }
 
-/// Opens the camera. With a calibration, its size is requested, and frames of another size are a fault.
+/// Opens the camera. With a calibration, its picture size is requested, and frames of another size are a fault.
 fn open_camera(
     from: Address,
     mut options: OpenOptions,
@@ -210,8 +210,8 @@ fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
     Ok(Some(folder.to_owned()))
 }
 
-/// Removes from `images` the one image that does not exist yet, which is the photo to be taken, and returns it;
-/// `photo.png` in the current folder if all exist.
+/// Removes the one image that does not exist yet from `images` and returns it, as the path of the photo to be taken;
+/// `photo.png` in the current folder if all images exist.
 fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     let is_new = |(image, annotation): &mut (PathBuf, Option<PathBuf>)| annotation.is_none() && !image.exists();
     let mut new = images.extract_if(.., is_new).map(|(image, _)| image);
@@ -219,7 +219,8 @@ fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     if let (Some(first), Some(second)) = (&first, new.next()) {
         let (first, second) = (first.display(), second.display());
         return Err(Usage(format!(
-            "expected at most one IMAGE that is not there yet, for the photo that --from takes, found {first} and {second}"
+            "expected at most one IMAGE that does not exist yet, for the photo that --from takes, found {first} and \
+             {second}"
         ))
         .into());
     }
@@ -235,7 +236,7 @@ fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     Ok(photo)
 }
 
-/// Splits `IMAGE:ANNOTATION`; an argument that is itself the name of an existing file is not split.
+/// Splits `IMAGE:ANNOTATION`. An argument that is the name of an existing file is not split.
 fn split(argument: &str) -> (PathBuf, Option<PathBuf>) {
     if Path::new(argument).exists() {
         return (argument.into(), None);

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::exit::Usage;
 
-/// Maximum size of a board's file; `sdg camera board` writes smaller ones.
+/// Maximum size of a board file; `sdg camera board` writes smaller ones.
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The board in the pictures.
@@ -59,7 +59,7 @@ pub fn squares(text: &str) -> Result<[u32; 2], String> {
     sides.ok_or_else(|| format!("expected squares horizontally and vertically, such as 9x6, found {text}"))
 }
 
-/// The picture in grey, the input of board detection.
+/// The picture in greyscale, as board detection needs it.
 pub fn grey(picture: &RgbImage) -> GrayImage {
     image::imageops::grayscale(picture)
 }

@@ -37,7 +37,7 @@ pub struct CalibrateArgs {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    // Flattened last: its help heading also applies to all options after it.
+    // Flattened last, because its help heading applies to all options after it.
     #[command(flatten)]
     live: TakingArgs,
 }
@@ -70,14 +70,14 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     }
     let Some(first) = seen.first() else {
         if args.pictures.is_empty() {
-            bail!("expected pictures of the board, found none: the board was never seen at rest");
+            bail!("expected pictures of the board, found none: the board was never at rest in a frame");
         }
         bail!("expected pictures that show the board, found none among {}", args.pictures.len());
     };
     let (size, first) = (first.size, first.path.as_path());
     if let Some(other) = seen.iter().find(|other| other.size != size) {
         bail!(
-            "{}: expected pictures of one size: {} x {} as {}, found {} x {}",
+            "{}: expected pictures of the same size: {} x {} as {}, found {} x {}",
             other.path.display(),
             size.0,
             size.1,
@@ -121,7 +121,7 @@ fn warn_of_squares(board: &Board, seen: &[Seen]) {
     }
 }
 
-/// Fails before any picture is taken if the existing file cannot be updated. It is not registered as an input here: it
+/// Fails before any picture is taken if the existing file cannot be updated. The file is not registered as an input: it
 /// is read again when it is written.
 fn check_updatable(path: &Path) -> Result<()> {
     let Ok(text) = fs::read_to_string(path) else { return Ok(()) };
@@ -134,7 +134,7 @@ fn check_updatable(path: &Path) -> Result<()> {
 }
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
-    // The board and the pictures are inputs and must not be replaced; the camera file itself may be updated.
+    // The board and the pictures are inputs, which must not be replaced; the camera file itself may be updated.
     sdg_files::check_writable(&args.out)?;
     let existing = match fs::exists(&args.out) {
         Ok(true) => String::from_utf8(sdg_files::read(&args.out, MAX_BYTES)?)

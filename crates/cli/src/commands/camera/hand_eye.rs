@@ -21,7 +21,7 @@ use crate::exit::{Outcome, one_line};
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
 pub struct HandEyeArgs {
-    /// The camera's file from `sdg camera calibrate`
+    /// The camera file from `sdg camera calibrate`
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
     /// Robot poses and the names of the pictures taken at them: YAML, JSON or CSV; the pictures are in the same folder
@@ -32,8 +32,7 @@ pub struct HandEyeArgs {
     mount: MountName,
     #[command(flatten)]
     board: BoardInUse,
-    /// The table's z in the robot's base, for a camera beside the robot; default: the value in the camera's file, else
-    /// 0
+    /// The table's z in the robot's base, for a camera beside the robot; default: the value in the camera file, else 0
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     table_height_mm: Option<f64>,
     /// The file to write, with the camera's pose; default: nothing is written
@@ -60,12 +59,12 @@ impl From<MountName> for Mount {
     }
 }
 
-/// Maximum size of a file of robot poses.
+/// Maximum size of a poses file.
 const MAX_BYTES: u64 = 4 << 20;
-/// A picture whose error is more than this many times the median is reported.
+/// Ratio of a picture's error to the median from which the picture is reported.
 const MAX_RMS_RATIO: f64 = 3.0;
 
-/// Finds the pose of the camera on the robot or beside it.
+/// Finds the pose of the camera on the robot's hand or beside the robot.
 pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let mount = Mount::from(args.mount);
@@ -113,7 +112,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A missing picture is an error in the file of poses; it must not be treated as a picture without the board.
+/// Checks that the pictures exist. A missing picture is an error in the poses file, unlike a picture without the board.
 fn check_pictures_exist(poses: &[RobotPose], folder: &Path) -> Result<()> {
     match poses.iter().map(|pose| folder.join(&pose.picture)).find(|picture| !picture.exists()) {
         Some(missing) => bail!("{}: expected the picture of a robot pose, found no such file", missing.display()),

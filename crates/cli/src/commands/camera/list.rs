@@ -17,7 +17,7 @@ pub struct ListArgs {
     pub json: bool,
 }
 
-/// Prints one line per camera and one per format of it.
+/// Prints one line for each camera and one for each of its formats.
 pub fn run(args: &ListArgs) -> Result<Outcome> {
     let nodes = v4l::nodes();
     let mut stdout = std::io::stdout().lock();

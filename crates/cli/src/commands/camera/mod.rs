@@ -34,7 +34,7 @@ pub enum CameraCommand {
     Calibrate(calibrate::CalibrateArgs),
     /// Find a camera's pose from one picture of the board on the table
     Table(table::TableArgs),
-    /// Find a camera's pose on the robot, or beside it, from robot poses and pictures of the board
+    /// Find the pose of a camera on the robot's hand or beside the robot, from robot poses and pictures of the board
     HandEye(hand_eye::HandEyeArgs),
 }
 

@@ -24,8 +24,8 @@ pub struct TableArgs {
     /// One picture of the sheet on the table
     #[arg(value_name = "PICTURE")]
     picture: PathBuf,
-    /// The camera's file from `sdg camera calibrate`; without it, the focal length is estimated and no lens distortion
-    /// is assumed
+    /// The camera file from `sdg camera calibrate`; without it, the focal length is estimated and no lens distortion is
+    /// assumed
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     #[command(flatten)]
@@ -61,7 +61,7 @@ pub struct TableArgs {
         allow_hyphen_values = true
     )]
     table_height_mm: f64,
-    /// Height of the sheet's upper side over the table, if the sheet is on a plate
+    /// Height of the sheet's upper side above the table, if the sheet is on a plate
     #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM", value_parser = height_mm)]
     sheet_thickness_mm: f64,
     /// Height of a part's marks at which the error caused by a wrong focal length is reported
@@ -70,7 +70,7 @@ pub struct TableArgs {
     /// Focal length in pixels, for a camera without a file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// The file to write, with `table:`; default: the camera's file
+    /// The file to write, with `table:`; default: the camera file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -83,7 +83,7 @@ const FOCAL_ERROR: f64 = 0.1;
 /// Maximum distance from a robot's base to a sheet.
 const MAX_REACH_MM: f64 = 5000.0;
 
-/// Finds the camera's pose over the sheet and writes it into a camera file.
+/// Finds the camera's pose above the sheet and writes it into a camera file.
 pub fn run(args: &TableArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let frame_from_sheet = frame_from_sheet(args)?;

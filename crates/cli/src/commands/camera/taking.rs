@@ -1,7 +1,7 @@
-//! `sdg camera calibrate --from`: takes pictures of the board automatically; a page shows which view is needed next.
+//! `sdg camera calibrate --from`: takes pictures of the board automatically; a page shows the view that is needed next.
 //!
 //! ```text
-//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and new? ─ PNG in --taken ─ calibrate ─ what is missing
+//! camera ─ frame ─ find_board ─ PictureTaker: at rest, and a new view? ─ PNG in --taken ─ calibrate ─ missing views
 //!            └──────── corners, views, empty parts and text drawn on it ─ the page on 127.0.0.1
 //! ```
 
@@ -27,9 +27,10 @@ use crate::web_browser;
 
 /// Default folder of the pictures.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
-/// Number of pictures after which taking ends, if nothing is missing; docs/calibration.md states both numbers.
+/// Number of pictures after which taking ends if nothing is missing; docs/calibration.md states this number and the
+/// next.
 const MIN_TAKEN: usize = 12;
-/// Number of pictures after which taking ends in any case: more do not improve the result.
+/// Number of pictures after which taking always ends: more do not improve the result.
 const MAX_TAKEN: usize = 40;
 const BOARD: Color = Color([255, 196, 61]);
 
@@ -58,7 +59,7 @@ pub struct TakingArgs {
 
 /// A picture in which the board was found.
 pub struct Seen {
-    /// Its file.
+    /// The file of the picture.
     pub path: PathBuf,
     /// Width and height.
     pub size: (u32, u32),
@@ -66,7 +67,7 @@ pub struct Seen {
     pub corners: Vec<SeenCorner>,
 }
 
-/// Text in the lower left corner of the page.
+/// The texts in the lower left corner of the page.
 struct Words {
     now: String,
     next: String,
@@ -161,8 +162,8 @@ impl<'a> Taking<'a> {
         self.seen.len() >= MAX_TAKEN || (self.seen.len() >= MIN_TAKEN && self.next.is_empty())
     }
 
-    /// Searches a frame for the board, saves the frame if it is useful, and returns the picture for the page and the
-    /// same text in words.
+    /// Searches a frame for the board and saves the frame if it is useful. Returns the picture for the page, and its
+    /// text.
     fn look(&mut self, picture: RgbImage) -> Result<(RgbImage, String)> {
         let corners = find_board(&grey(&picture), self.board);
         let now = match &corners {
@@ -207,7 +208,7 @@ impl<'a> Taking<'a> {
         Ok(())
     }
 
-    /// The view that would help most.
+    /// The view that is needed most.
     fn lacking(&self) -> String {
         let taken = self.taker.taken();
         if taken.len() < MIN_PICTURES {
@@ -222,8 +223,7 @@ impl<'a> Taking<'a> {
         }
     }
 
-    /// The picture with the board's corners, the views so far, the regions without views, and the instructions drawn on
-    /// it.
+    /// The picture with the board's corners, the views taken so far, the regions without views, and the instructions.
     fn drawn(&self, mut picture: RgbImage, corners: &[SeenCorner], words: &Words) -> RgbImage {
         let width = line_width(&picture);
         for view in self.taker.taken() {
@@ -238,7 +238,7 @@ impl<'a> Taking<'a> {
         draw_keypoints(&mut picture, &places, &Pen::new(BOARD).width(0.6 * width));
         let text_px = (f64::from(picture.width().max(picture.height())) / 55.0).max(8.0);
         let mut bottom = f64::from(picture.height());
-        // One line per sentence, so that each fits into the picture.
+        // One line for each sentence, so that it fits into the picture.
         for line in words.next.split(": ").collect::<Vec<_>>().into_iter().rev().filter(|line| !line.is_empty()) {
             draw_label(&mut picture, Point2::new(0.0, bottom), line, Color::NEUTRAL, text_px);
             bottom -= 2.5 * text_px;

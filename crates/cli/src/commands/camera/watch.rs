@@ -69,7 +69,7 @@ pub fn run(args: &WatchArgs) -> Result<Outcome> {
     Ok(if num_frames > 0 { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// The measurements of one line.
+/// The measurements that one line reports.
 struct Period {
     start: Instant,
     num_frames: u64,
@@ -77,7 +77,7 @@ struct Period {
     last_number: Option<u64>,
     size: (u32, u32),
     brightness_sum: f64,
-    /// For each fault's name: its count, and the last occurrence in words.
+    /// For each fault's name: the count and the text of the last fault.
     faults: BTreeMap<&'static str, (u64, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! `sdg demo`: the complete task on shipped input, from a photo to grasps.
+//! `sdg demo`: the complete task with shipped data, from a photo to grasps.
 
 #[cfg(feature = "simulation")]
 mod run;

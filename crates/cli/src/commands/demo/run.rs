@@ -1,4 +1,4 @@
-//! `sdg demo`: the complete task on shipped input, from a photo to grasps.
+//! `sdg demo`: the complete task with shipped data, from a photo to grasps.
 
 use std::time::Duration;
 
@@ -17,9 +17,9 @@ use crate::interrupt::Interrupt;
 use crate::parts::part_named;
 use crate::teaching_progress::TeachingProgress;
 
-/// Numbers of test pictures with the part and without it.
+/// Number of test pictures with the part, and number without it.
 const VIEWS: (usize, usize) = (12, 12);
-/// Seeds of those pictures; they differ from the seeds of attempts and tests.
+/// Seed of the test pictures; differs from the seeds of attempts and tests.
 const VIEWS_SEED: u64 = 7_000_000;
 
 /// Teaches, tests, grasps and writes the report.
@@ -32,7 +32,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());
     let mut options = TeachOptions::new(args.seed);
-    // The workcell's camera hovers at the height from which the photo was taken.
+    // The camera of the workcell is at the height from which the photo was taken.
     options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
     options.time_budget = args.time_budget.map(Duration::from_secs_f64);
     options.symmetry = object.symmetry;
@@ -47,7 +47,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let mut trials = try_views(&taught.model, &object, true, VIEWS.0, VIEWS_SEED, Verification::ByShape)?;
     trials.extend(try_views(&taught.model, &object, false, VIEWS.1, VIEWS_SEED, Verification::ByShape)?);
     eprintln!(
-        "tried on unseen pictures: right on {} of {} with the part, {} false alarms on {} without",
+        "tested on unseen pictures: correct in {} of {} with the part, {} false alarms in {} without",
         trials.iter().filter(|trial| trial.is_right()).count(),
         VIEWS.0,
         trials.iter().filter(|trial| trial.is_false_alarm()).count(),

@@ -18,7 +18,7 @@ Angles:
                |
       +-180 ---+---> 0 degrees, to the right of the picture
                |
-               v     angles grow clockwise, as seen
+               v     angles increase clockwise
           90, down";
 
 /// `sdg detect`
@@ -37,12 +37,11 @@ pub struct DetectArgs {
     /// Maximum number of parts per image, highest scores first
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub max: u32,
-    /// Smallest and largest size of the part relative to the photo, in place of the values that the model was taught
-    /// with
+    /// Smallest and largest size of the part relative to the photo, instead of the taught values
     #[arg(long, value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: Option<SizeTolerance>,
-    /// The calibrated camera that took the pictures: grasps are also given in metres, and parts of another size are
-    /// refused. For models taught with a camera, the same one or another
+    /// The calibrated camera that took the pictures: grasps are also given in metres, and parts of a different size are
+    /// refused. For models taught with a camera, which may be a different one
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
     /// Search only this part of each picture: left edge, upper edge, width and height in its pixels; "all" searches the
@@ -67,7 +66,7 @@ pub struct DetectArgs {
     /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of images, or - for one image from standard input
     #[arg(required_unless_present = "from", value_name = "IMAGE|DIR|-")]
     pub images: Vec<PathBuf>,
-    /// Live pictures in place of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM
+    /// Live pictures instead of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM
     /// ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Parts are tracked from frame to frame, or searched for in each
     /// frame with --every-frame; --json prints one line per frame
     #[arg(long, value_name = "ADDRESS", help_heading = "Live pictures")]

@@ -1,4 +1,4 @@
-//! The pictures of `sdg detect`, checked before the first is searched.
+//! The pictures of `sdg detect`, checked before the search begins.
 
 use std::path::{Path, PathBuf};
 
@@ -7,8 +7,8 @@ use sdg_inputs::{PictureInput, STANDARD_INPUT};
 
 use crate::exit::Usage;
 
-/// Drawings have the names of their pictures with the extension `.png`. In the pictures' folder they would overwrite
-/// pictures, and a second run would read them as pictures.
+/// Checks that drawings do not replace pictures. A drawing has the name of its picture with the extension `.png`: in
+/// the pictures' folder it would overwrite a picture, and a second run would read it as one.
 ///
 /// # Errors
 /// A picture is in this folder.
@@ -30,14 +30,14 @@ pub fn check_drawn_elsewhere<'a>(folder: &Path, pictures: impl Iterator<Item = &
     Ok(())
 }
 
-/// Standard input can be read only once.
+/// Checks that standard input is named once, because it can be read only once.
 ///
 /// # Errors
-/// [`Usage`] where it is named twice.
+/// [`Usage`] if it is named more than once.
 pub fn check_standard_input(arguments: &[PathBuf]) -> Result<()> {
     match arguments.iter().filter(|argument| argument.as_os_str() == STANDARD_INPUT).count() {
         0 | 1 => Ok(()),
-        count => Err(Usage(format!("-: expected standard input once, found it {count} times")).into()),
+        count => Err(Usage(format!("-: expected standard input once, found {count} times")).into()),
     }
 }
 

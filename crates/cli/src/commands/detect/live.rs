@@ -1,8 +1,8 @@
 //! `sdg detect --from`: parts in live pictures, one line per frame.
 //!
 //! ```text
-//! camera ─ frame ─┬─ LiveTracker: followed from frame to frame, searches beside ─┬─ line on standard output
-//!                 └─ --every-frame: each frame searched on its own ──────────────┴─ picture on 127.0.0.1 (--draw)
+//! camera ─ frame ─┬─ LiveTracker: tracked, and searched on a second thread ─┬─ line on standard output
+//!                 └─ --every-frame: each frame searched independently ──────┴─ picture on 127.0.0.1 (--draw)
 //! ```
 
 use std::io::Write;
@@ -66,7 +66,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         left -= 1;
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
-        // In a folder, every picture of a wrong size is reported, like any picture that cannot be used.
+        // In a folder, every picture of a wrong size is reported, like every other unusable picture.
         if !matches!(address, Address::Folder { .. })
             && let Some(error) = sizes.check(finder.perception(), &picture)?
         {
@@ -77,7 +77,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         }
         let parts = match finder.find(&picture, &frame) {
             Ok(parts) => parts,
-            // In a folder, one picture's error does not affect the others.
+            // In a folder, an error in one picture does not affect the others.
             Err(error) if matches!(address, Address::Folder { .. }) => {
                 let error = anyhow::Error::from(error).context(format!("frame {} of {address}", frame.number));
                 write_error(&mut stdout, args, address, &error)?;
@@ -105,23 +105,23 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// Skips frames of a wrong size: a camera that is switched to another size gives frames to which the region or the
-/// calibration does not apply.
+/// Skips frames of a wrong size: after a camera is switched to another size, neither the region nor the calibration
+/// applies.
 #[derive(Default)]
 struct Sizes {
-    /// A frame of the right size was seen.
+    /// Whether a frame of the right size has arrived.
     is_any_right: bool,
-    /// The wrong size that was reported last, until a frame of the right size.
+    /// The last reported wrong size; `None` after a frame of the right size.
     told: Option<(u32, u32)>,
 }
 
 impl Sizes {
-    /// `None` if the picture can be searched. A picture of another size is skipped; the first one in a row returns the
+    /// `None` if the picture can be searched. A picture of a wrong size is skipped; the first one in a row returns the
     /// error to report.
     ///
     /// # Errors
-    /// The first picture of the stream has another size: the following ones would have it too, and nothing would ever
-    /// be found.
+    /// The first picture of the stream has a wrong size: the following pictures would have it as well, and all would be
+    /// skipped.
     fn check(&mut self, detector: &Perception, picture: &RgbImage) -> Result<Option<Option<anyhow::Error>>> {
         let Err(error) = detector.check_picture(picture) else {
             *self = Self { is_any_right: true, told: None };
@@ -215,7 +215,7 @@ fn write_line(
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }
-    // Flushed, because readers of the stream wait for this frame.
+    // Flushed, because programs that read the output wait for this frame.
     Ok(out.flush()?)
 }
 
@@ -259,7 +259,7 @@ struct FaultLine {
 struct PartLine {
     #[serde(flatten)]
     found: FoundRecord,
-    /// As in the records of pictures.
+    /// As in the records of pictures: the indices of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]

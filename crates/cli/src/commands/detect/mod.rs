@@ -37,8 +37,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
     if args.from.is_some() && args.min_score != DEFAULT_MIN_SCORE && !args.every_frame && !args.no_verify {
         return Err(Usage(
-            "--min-score: expected images, or live pictures of which each is searched on its own (--every-frame), found live \
-             pictures in which parts are followed"
+            "--min-score: expected images, or live pictures with --every-frame, found live pictures with tracking"
                 .to_owned(),
         )
         .into());
@@ -95,13 +94,13 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     match (batch.num_failed, batch.num_found > 0) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
-        // For one picture its line says everything.
+        // For a single picture, its line contains the error.
         (1, _) if batch.is_alone => bail!(batch.last_error),
         (failed, _) => bail!("{failed} of {} pictures could not be used", failed + batch.num_used),
     }
 }
 
-/// Processes pictures in order and prints a line for each.
+/// Processes pictures in order and prints a line for each of them.
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
@@ -110,17 +109,17 @@ struct Batch<'a, W> {
     drawn: BTreeSet<String>,
     num_used: usize,
     num_failed: usize,
-    /// It is the only picture of this run.
+    /// Whether it is the only picture of this run.
     is_alone: bool,
     last_error: String,
-    /// Accepted detections in all pictures.
+    /// Number of accepted detections in all pictures.
     num_found: usize,
-    /// Pictures with at least one accepted detection.
+    /// Number of pictures with at least one accepted detection.
     num_with_parts: usize,
 }
 
 impl<W: Write> Batch<'_, W> {
-    /// Detects parts in a picture and prints its line; a picture that cannot be used gets a line with its error.
+    /// Detects parts in a picture and prints its line. For a picture that cannot be used, the line has its error.
     ///
     /// # Errors
     /// Standard output cannot be written.
@@ -175,8 +174,8 @@ impl<W: Write> Batch<'_, W> {
     }
 }
 
-/// The picture with its detections drawn; for the best refused ones also the differences from the demonstration and the
-/// reasons.
+/// The picture with its detections drawn, and for the best refused ones the reasons and the differences from the
+/// demonstration.
 fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImage {
     let detections = || found.iter().map(|found| &found.detection);
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
@@ -188,7 +187,7 @@ fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImag
     image
 }
 
-/// An image and everything that was detected in it.
+/// An image and its detections.
 struct Seen {
     size: [u32; 2],
     seconds: f64,
@@ -258,22 +257,22 @@ struct ImageLine<'a> {
     detections: Vec<PictureRecord>,
 }
 
-/// A detection with explanatory values.
+/// A detection with values that explain it.
 #[derive(Serialize)]
 struct PictureRecord {
     #[serde(flatten)]
     found: FoundRecord,
-    /// Size relative to the photo.
+    /// Size of the part relative to the photo.
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     advice: Option<&'static str>,
-    /// Indices, in this list, of the parts that the jaws would touch.
+    /// Indices in the list of detections of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
 }
 
-/// One line of `--json` for an image that cannot be used.
+/// One line of `--json` for a picture that cannot be used.
 #[derive(Serialize)]
 struct ErrorLine {
     image: String,

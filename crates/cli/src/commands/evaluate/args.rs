@@ -15,14 +15,14 @@ Labelled pictures (--pictures DIR):
   DIR contains pictures (PNG, JPEG, WebP, BMP, TIFF) and their labels: LabelMe (a JSON file of the same name beside each picture)
   or COCO (one JSON file with `images` and `annotations`) or truth.json; with truth.json, other labels are ignored
   (docs/file-formats.md). Each instance of the part has a box or an outline and the two points of the grasp, grasp_start and
-  grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in `flags`; COCO: in `attributes`)
+  grasp_end; in LabelMe its shapes have the same group_id. An instance flagged `optional` (LabelMe: in `flags`; COCO: in `attributes`)
   counts neither as missed nor as wrong, and may lack the grasp. A picture with labels but without instances is a picture without
   the part. Pictures that the model was taught from are left out. Subfolders are not searched: run the command once per folder.
 
-  A hit is a detection within 4 % of the instance's diagonal and within 10 degrees of the marks; turns in which the part looks the
+  A hit is a detection within 4 % of the instance's diagonal and within 10 degrees of the marks; rotations after which the part looks the
   same (`sdg teach --symmetry`) are equivalent. Detections are matched to instances one to one, highest score first. The diagonal
   is that of the demonstration's box, scaled by the length of the instance's marks over that of the demonstration's; truth.json
-  states diagonal and symmetry of each instance. A picture is clean if it has a right detection and no wrong one.
+  states diagonal and symmetry of each instance. A picture is clean if it has a correct detection and no wrong one.
 
   --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
   pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
@@ -104,7 +104,7 @@ pub struct EvaluateArgs {
     pub unverified: bool,
     /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, covered, dark, blur, tint,
     /// clutter, instances, look-alikes; all: pictures), and grasps under errors (no-error, marks, mark-height,
-    /// hand-eye, friction, shake; all: grasps), in place of the paper's protocol. Without names: everything, on all
+    /// hand-eye, friction, shake; all: grasps), instead of the paper's protocol. Without names: everything, on all
     /// parts
     #[arg(
         long,
@@ -117,7 +117,7 @@ pub struct EvaluateArgs {
     )]
     pub axes: Option<Vec<String>>,
     /// Evaluate parts taught in the plan view of one calibrated camera on pictures of other cameras (webcam, phone,
-    /// overhead), along the axes, and on parts of other sizes (other-sizes), in place of the paper's protocol. Without
+    /// overhead), along the axes, and on parts of other sizes (other-sizes), instead of the paper's protocol. Without
     /// names: everything, by models S and C on all parts
     #[arg(
         long,
@@ -139,7 +139,7 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub axis_views: u32,
-    /// Number of edge points that model S compares at each pose of its search, in place of the taught number
+    /// Number of edge points that model S compares at each pose of its search, instead of the taught number
     #[arg(
         long,
         value_name = "N",
@@ -154,7 +154,7 @@ pub struct EvaluateArgs {
     /// Network, training and augmentation
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Number of optimiser steps, in place of the preset's
+    /// Number of optimiser steps, instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
     /// Maximum seconds for training one network; with --jobs 1 each training has the whole machine

@@ -25,7 +25,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
-    // Beside the page of the paper's protocol, which is kept.
+    // In a folder beside the page of the paper's protocol, which is kept.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
     sdg_files::prepare_folder(&report_folder)?;
 
@@ -61,14 +61,14 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         println!("{}", json_line(&line)?);
     } else {
         print!("{}{}", summary_lines(&summary), difference_lines(&comparisons));
-        println!("seconds of a worker: {}", summary.seconds);
+        println!("worker seconds: {}", summary.seconds);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match (failures.first(), remaining) {
         (None, 0) => Ok(Outcome::Done),
-        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command continues"),
+        (None, _) => bail!("interrupted with {remaining} units of work left: run the same command again to continue"),
         (Some(first), _) => bail!(
-            "{} units of work failed, {remaining} are to do: the same command tries again; the first: {first}",
+            "{} units of work failed, {remaining} are left: run the same command again to retry; the first error: {first}",
             failures.len()
         ),
     }

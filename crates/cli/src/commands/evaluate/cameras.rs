@@ -53,7 +53,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     }
     match summary.remaining {
         0 => Ok(Outcome::Done),
-        remaining => bail!("interrupted with {remaining} units of work to do: the same command continues"),
+        remaining => bail!("interrupted with {remaining} units of work left: run the same command again to continue"),
     }
 }
 

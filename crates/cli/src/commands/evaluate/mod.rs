@@ -1,5 +1,5 @@
-//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, the user's own
-//! pictures, or split sets.
+//! `sdg evaluate`: the paper's protocol, as a whole or in units; pictures along axes; other cameras; labelled pictures;
+//! sets on both sides of a split.
 
 mod args;
 #[cfg(feature = "simulation")]
@@ -24,7 +24,7 @@ pub use args::EvaluateArgs;
 
 use crate::exit::Outcome;
 
-/// Runs the kind of evaluation that the arguments name.
+/// Runs the kind of evaluation that the arguments select.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     if args.pictures.is_some() {
         return pictures::run(args);

@@ -6,10 +6,10 @@ use sdg_grasp::ModelKind;
 
 use crate::exit::Usage;
 
-/// The models with these letters or names; `otherwise` if there are no names.
+/// The models with these letters or names, or `otherwise` if there are no names.
 ///
 /// # Errors
-/// An unknown name, or a model given twice.
+/// A name is unknown, or a model is given twice.
 pub fn models(names: &[String], otherwise: &[ModelKind]) -> Result<Vec<ModelKind>> {
     if names.is_empty() {
         return Ok(otherwise.to_vec());

@@ -1,4 +1,4 @@
-//! `sdg evaluate --pictures`: a taught model on the user's own labelled pictures.
+//! `sdg evaluate --pictures`: tests a taught model on the user's own labelled pictures.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
 
-/// Default folder of the page; not the folder of the user's pictures.
+/// Default folder of the page, outside the folder of the user's pictures.
 const DEFAULT_REPORT: &str = "target/pictures-report";
 
 /// Reads and checks every label first, then searches the pictures in order.
@@ -44,7 +44,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         let name = picture.name();
         let of_picture = match Tested::detect(picture, &detector, verification) {
             Ok(of_picture) => of_picture,
-            // The model's region is for pictures of another size.
+            // The model's region is for pictures of a different size.
             Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
                 labelled.left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
                 continue;

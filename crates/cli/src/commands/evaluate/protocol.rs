@@ -36,18 +36,18 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
     let remaining = write_tables(args, &evaluation, &settings)?;
     if interrupted {
-        bail!("interrupted with {remaining} units of work to do: the same command continues");
+        bail!("interrupted with {remaining} units of work left: run the same command again to continue");
     }
     Ok(Outcome::Done)
 }
 
-/// Folder of the page.
+/// The folder of the page.
 pub(super) fn report_folder(args: &EvaluateArgs) -> &Path {
     args.report.as_ref().unwrap_or(&args.out)
 }
 
-/// Writes the tables of the finished units, prints a summary, and returns the number of remaining units. `settings` are
-/// those shown to the reader.
+/// Writes the tables of the finished units, prints a summary, and returns the number of remaining units. The page
+/// states `settings`.
 pub(super) fn write_tables(args: &EvaluateArgs, evaluation: &Evaluation, settings: &Settings) -> Result<usize> {
     let command = command(args, settings);
     let WrittenTables { summaries, remaining, cells, tables, report } =

@@ -1,4 +1,4 @@
-//! Arguments that all kinds of `sdg evaluate` share: parts, preset and workers.
+//! Arguments of all kinds of `sdg evaluate`: parts, preset and workers.
 
 use anyhow::Result;
 use sdg_evaluation::Settings;
@@ -12,7 +12,7 @@ use crate::parts::part_named;
 /// The preset, and the settings on which the stored results depend.
 ///
 /// # Errors
-/// Unknown preset.
+/// The preset is unknown.
 pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
     let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
     let settings = Settings {
@@ -29,12 +29,12 @@ pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
     Ok((preset, settings))
 }
 
-/// Number of units run in parallel: as given, else one per core.
+/// Number of units to run in parallel: as given, or else one per core.
 pub fn jobs(args: &EvaluateArgs) -> usize {
     args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
 }
 
-/// The parts with these names; `all` if there are no names.
+/// The parts with these names, or `all` if there are no names.
 pub fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Result<Vec<ObjectSpec>> {
     let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
     let mut objects: Vec<ObjectSpec> = Vec::new();

@@ -1,4 +1,5 @@
-//! `sdg evaluate --list-units`, `--unit`, `--collect`, `--watch` and `--submit`: the protocol's units shared by many processes.
+//! `sdg evaluate --list-units`, `--unit`, `--collect`, `--watch` and `--submit`: the protocol's units divided among
+//! many processes.
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -27,12 +28,12 @@ use crate::progress::EvaluationProgress;
 /// Time between two reads of the folder.
 const POLL_INTERVAL: Duration = Duration::from_secs(2);
 
-/// The evaluation that the arguments describe.
+/// The evaluation described by the arguments.
 struct Asked {
     models: Vec<ModelKind>,
     objects: Vec<ObjectSpec>,
     preset: Preset,
-    /// Settings of an ordinary run: without the program's hash.
+    /// Settings of an ordinary run, without the program's hash.
     settings: Settings,
     unverified: bool,
 }
@@ -59,7 +60,7 @@ impl Asked {
         Store::open_shared(folder, &settings)
     }
 
-    /// In each process, units run one at a time.
+    /// The evaluation in one process, where units run one at a time.
     fn evaluation<'a>(&'a self, store: &'a Store) -> Evaluation<'a> {
         Evaluation {
             models: &self.models,
@@ -116,7 +117,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         })
     });
     let named = named.collect::<Result<Vec<_>, _>>()?;
-    // A missing simulator is reported once, before anything is done or written.
+    // A missing simulator is reported once, before any unit starts.
     if named.iter().any(|unit| UnitKind::of(&unit.name).is_some_and(UnitKind::is_simulated)) {
         sdg_simulation::load()?;
     }
@@ -132,7 +133,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
-            Ok(Ended::Interrupted) => bail!("{}: interrupted; the same command continues", unit.name),
+            Ok(Ended::Interrupted) => bail!("{}: interrupted; run the same command again to continue", unit.name),
             Err(error) => {
                 failures.push(error);
                 continue;
@@ -158,7 +159,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
 fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let store = asked.open(&args.out)?;
     let Some(_collecting) = Collecting::begin(&args.out)? else {
-        bail!("{}: another --collect is at work in this folder", args.out.display());
+        bail!("{}: another --collect is running in this folder", args.out.display());
     };
     let (evaluation, units) = (asked.evaluation(&store), asked.units());
     let faults = faults(&evaluation, &units)?;
@@ -169,7 +170,7 @@ fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     sdg_files::prepare_folder(protocol::report_folder(args))?;
     let remaining = protocol::write_tables(args, &evaluation, &asked.settings)?;
     if remaining > 0 {
-        bail!("{}: {remaining} units have a receipt and no result", args.out.display());
+        bail!("{}: {remaining} units have a receipt but no result", args.out.display());
     }
     Ok(Outcome::Done)
 }
@@ -187,7 +188,7 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
         let screen = progress.to_string();
         let line = screen.lines().next().unwrap_or_default();
         if is_terminal {
-            // Redraws from the upper left corner and clears the old content.
+            // Redraws from the upper left corner, and clears the rest.
             print!("\x1b[H\x1b[J{screen}");
         } else if progress.is_settled {
             print!("{screen}");
@@ -237,7 +238,10 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;
     let status = bash.wait()?;
     if !status.success() {
-        bail!("the script that hands units to Slurm ended with {status}: is sbatch here, and does Slurm run?");
+        bail!(
+            "the script that hands units to Slurm ended with {status}: check that sbatch is installed and Slurm is \
+               running"
+        );
     }
     println!(
         "then: sdg evaluate --watch {}; {} --out {} --collect",

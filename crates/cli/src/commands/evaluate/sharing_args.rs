@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 /// The heading of these options in the help.
 const SHARING: &str = "Units for a cluster (docs/slurm.md)";
 
-/// Running single units in a shared folder, and making the tables from their results.
+/// Running single units in a shared folder, and making the tables of all results.
 #[derive(Debug, ClapArgs)]
 pub struct SharingArgs {
     /// List the names of all units of work and exit; with --json also each unit's dependencies and whether it is done
@@ -28,7 +28,7 @@ pub struct SharingArgs {
     /// otherwise report the error of each faulty unit
     #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
     pub collect: bool,
-    /// Show the progress of the units in a folder until nothing changes any more; with --json once, as one object
+    /// Show the progress of the units in a folder until it no longer changes; with --json once, as one object
     #[arg(
         long,
         value_name = "DIR",
@@ -47,7 +47,7 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub submit: Option<String>,
-    /// Run that script in place of printing it
+    /// Run that script instead of printing it
     #[arg(long, requires = "submit", help_heading = SHARING)]
     pub yes: bool,
     /// Number of cores requested for a unit
@@ -86,7 +86,7 @@ pub struct SharingArgs {
 }
 
 impl SharingArgs {
-    /// Whether any of these options is given; otherwise the whole evaluation runs.
+    /// Whether any of these options is given. Otherwise, the whole evaluation runs.
     pub fn is_asked_for(&self) -> bool {
         self.list_units || !self.unit.is_empty() || self.collect || self.watch.is_some() || self.submit.is_some()
     }

@@ -13,7 +13,7 @@ use super::model_names::models;
 use crate::exit::{Outcome, Usage};
 use crate::progress::EvaluationProgress;
 
-/// Reads every set first, then teaches and measures one set at a time: the detector's speed is part of the result.
+/// Reads all sets first, then teaches and measures one set at a time, because the speed of detection is measured.
 pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     let Some(sets_folder) = &args.split.sets else {
         return Err(Usage("--split: expected --sets DIR beside it, found none".to_owned()).into());

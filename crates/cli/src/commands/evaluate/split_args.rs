@@ -15,7 +15,7 @@ Sets on both sides of a split (--split FILE --sets DIR):
   and each of --seeds, with the defaults of `sdg teach`; its pictures are searched as by `sdg detect` and counted as by --pictures.
   The tables show each set, each kind of picture, and the sides with 95 % intervals (Wilson), and the difference of tuned and
   reported (Newcombe), which is significant if its interval does not contain zero. Both intervals assume independent detections.
-  With several seeds, each figure is the worst of them. Wrong detections are given as a share of all accepted ones on pictures with
+  With several seeds, each figure is the worst of them. Wrong detections are given as a fraction of all accepted ones on pictures with
   the part.
 
   --json, or --results FILE beside the tables, gives one object: split, sides, models [{model, pictures_per_second, seeds [{seed,
@@ -41,10 +41,10 @@ pub struct SplitArgs {
         help_heading = SPLIT
     )]
     pub split: Option<PathBuf>,
-    /// The folder that holds the sets' folders
+    /// The folder with the folders of the sets
     #[arg(long, value_name = "DIR", requires = "split", help_heading = SPLIT)]
     pub sets: Option<PathBuf>,
-    /// Only the tuned sets: the others are neither read nor printed
+    /// Only the tuned sets; the others are neither read nor printed
     #[arg(long, requires = "split", help_heading = SPLIT)]
     pub tuned: bool,
     /// Seeds of the teachings

@@ -16,7 +16,7 @@ pub struct JointsDeg(pub JointVector);
 #[derive(Debug, Clone, Copy)]
 pub struct GoalPose(pub Isometry3<f64>);
 
-/// `--held-mm`.
+/// `--held-mm`: the held object.
 #[derive(Debug, Clone, Copy)]
 pub struct Held {
     pub diameter_m: f64,
@@ -28,7 +28,7 @@ pub fn opening_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
 }
 
-/// `--margin-mm`. A larger margin than 100 mm would fit no cell.
+/// `--margin-mm`. No workcell has room for more than 100 mm.
 pub fn margin_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a distance", [0.1, 100.0])
 }
@@ -83,13 +83,13 @@ impl FromStr for Held {
     }
 }
 
-/// Minimum distance of a goal from the origin of the robot's base.
+/// Minimum distance of a goal from the origin of the robot's base, in mm.
 const MIN_DISTANCE_MM: f64 = 10.0;
-/// Maximum distance of an angle from a multiple of an eighth turn that is attributed to rounding.
+/// Maximum distance of an angle from a multiple of 45 degrees that is attributed to rounding, in radians.
 const ROUNDING_RAD: f64 = 0.006;
 
-/// Whether the angles look like multiples of an eighth turn in radians, such as 3.14 and 0.785; 3.14 degrees is an
-/// unlikely input.
+/// Whether the angles look like multiples of 45 degrees in radians, such as 3.14 and 0.785. An input of 3.14 degrees is
+/// unlikely.
 fn are_radians(angles: &[f64]) -> bool {
     let is_part = |angle: f64| {
         let eighths = angle.abs() / FRAC_PI_4;

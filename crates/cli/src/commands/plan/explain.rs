@@ -12,14 +12,14 @@ pub(super) struct Explained {
     arm: ArmGeometry,
     start: JointVector,
     parts: Vec<PlanPart>,
-    /// Number of motions from rest to rest that follow the parts.
+    /// Number of motions from rest to rest through the parts of the path.
     num_motions: usize,
-    /// Duration of these motions in seconds; `stopping_secs` is the duration with a stop at every waypoint.
+    /// Duration of these motions, in seconds. `stopping_secs` is the duration with a stop at every waypoint.
     secs: f64,
     stopping_secs: f64,
-    /// The collision on the straight motion, if the plan is not straight.
+    /// The collision on the straight motion; `None` if the plan is straight.
     straight: Option<Proximity>,
-    /// Index of the goal in the order given, from 0, and the chosen turn in degrees.
+    /// Index of the goal in the given order, from 0, and its angle about the hand's axis, in degrees.
     goal: (usize, f64),
     num_checks: usize,
     planning_ms: f64,
@@ -69,9 +69,9 @@ impl Explained {
             self.planning_ms, self.num_checks
         ));
         let (goal, turn_deg) = self.goal;
-        line(format!("goal {}, turned by {turn_deg:.0}° about the hand's axis", goal + 1));
+        line(format!("goal {}, rotated by {turn_deg:.0}° about the hand's axis", goal + 1));
         match &self.straight {
-            None => line("nothing is in the way of the straight motion".to_owned()),
+            None => line("the straight motion is free of collisions".to_owned()),
             Some(nearest) => line(format!("not straight, because on the straight motion {nearest}")),
         }
         for (index, part) in self.parts.iter().enumerate() {

@@ -25,11 +25,11 @@ use explain::Explained;
 /// `sdg plan`
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// The workcell's file, with an [[obstacle]] for every object in the cell
+    /// The workcell file, with an [[obstacle]] for every object in the cell
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
     /// Joint angles at the start: seven, in degrees, as in 0,-45,0,-135,0,90,45; default: the first joints_deg in the
-    /// workcell's file, else the ready pose
+    /// workcell file, else the ready pose
     #[arg(long, value_name = "Q", allow_hyphen_values = true)]
     pub start: Option<JointsDeg>,
     /// Goal of the tcp in the base frame: X,Y,Z in mm; or X,Y,Z,YAW with the hand pointing straight down, rotated by
@@ -37,7 +37,7 @@ pub struct PlanArgs {
     /// reached fastest is chosen
     #[arg(long, value_name = "POSE", required = true, allow_hyphen_values = true)]
     pub goal: Vec<GoalPose>,
-    /// Number of equally spaced turns about the hand's axis in which the goal may be reached: 2 allows exchanged
+    /// Number of equally spaced angles about the hand's axis at which the goal may be reached: 2 allows exchanged
     /// fingers, 1 only the given pose
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=36))]
     pub turns: u32,
@@ -50,7 +50,7 @@ pub struct PlanArgs {
     /// Minimum distance to all obstacles
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = arguments::margin_mm)]
     pub margin_mm: f64,
-    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    /// Fraction of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     pub speed: f64,
     /// Seed of the random search; the same seed gives the same path
@@ -101,7 +101,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let explained = Explained::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
     eprint!("{}", explained.text());
     if let Some(refused) = refused_by_limits(&workcell, &motions) {
-        eprintln!("  sdg grasp would refuse it: {refused}");
+        eprintln!("  sdg grasp would reject it: {refused}");
     }
     if args.json {
         println!("{}", json_line(&explained.json())?);
@@ -112,7 +112,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// All goal poses in all their turns.
+/// Each goal pose at all rotations about its z axis.
 fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
     let turn = |index: u32| {
         let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(args.turns);

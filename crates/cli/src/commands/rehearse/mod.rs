@@ -33,16 +33,16 @@ pub struct RehearseArgs {
     /// Device for the network
     #[command(flatten)]
     pub compute: ComputeArgs,
-    /// The wrist camera: resolution, focal length and lens of this file, in place of 640x480 at 550 px without
+    /// The wrist camera: resolution, focal length and lens of this file, instead of 640x480 at 550 px without
     /// distortion; its pose follows from the arm. For models taught with a camera, which then work in the plan view
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// Put the part down at this place of the workcell's file: NAME, or NAME:CELL for one cell of a tray; with NAME
-    /// alone, the tray's cells are used in turn. An attempt succeeds if the part's true pose is within 3 mm and 3° of
-    /// its place
+    /// Put the part down at this place of the workcell file: NAME, or NAME:CELL for one cell of a tray; with NAME
+    /// alone, the tray's cells are used one after another. An attempt succeeds if the part's true pose is within 3 mm
+    /// and 3° of its place
     #[arg(long, value_name = "NAME", requires = "workcell")]
     pub place: Option<String>,
-    /// The workcell's file, with places and obstacles
+    /// The workcell file, with places and obstacles
     #[arg(long, value_name = "FILE", requires = "place")]
     pub workcell: Option<PathBuf>,
     /// Skip the check against the demonstration

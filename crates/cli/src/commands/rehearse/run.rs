@@ -33,7 +33,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         None => {
             let OwnPart { object, model, facts } = own_part(args, model, &model_file)?;
             eprintln!("{facts}");
-            // Sizes are known in metres, so a calibrated camera is used in every case.
+            // Sizes are known in metres, so that a calibrated camera is always used.
             camera = camera.or(Some(PinholeCamera::WRIST));
             (object, model)
         }
@@ -101,17 +101,17 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
     };
     OwnPart::make(model, model_file, &sizes, &in_words).map_err(|error| match error.downcast_ref() {
         Some(OwnPartError::NeedsLength) => Usage(needed("--length-mm MM", "the longer side of its box")).into(),
-        Some(OwnPartError::NeedsHeight) => Usage(needed("--height-mm MM", "its height over the table")).into(),
+        Some(OwnPartError::NeedsHeight) => Usage(needed("--height-mm MM", "its height above the table")).into(),
         Some(OwnPartError::LengthIsKnown { known_mm }) => Usage(format!(
-            "--length-mm: expected a model taught without --camera, found {model_file}, which knows that its part is \
-             {known_mm:.1} mm long"
+            "--length-mm: expected a model taught without --camera, found {model_file}, whose part is {known_mm:.1} \
+             mm long"
         ))
         .into(),
         _ => error,
     })
 }
 
-/// A place in the workcell's file.
+/// A place in the workcell file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
     if workcell.table_height_m != 0.0 {

@@ -12,10 +12,10 @@ use crate::robots::RobotChoice;
 /// The arm.
 #[derive(Debug, Args)]
 pub struct ArmArgs {
-    /// HOST or HOST:PORT; default: the address in the workcell's file
+    /// HOST or HOST:PORT; default: the address in the workcell file
     #[arg(long, value_name = "ADDRESS")]
     pub robot: Option<RobotChoice>,
-    /// The workcell's file
+    /// The workcell file
     #[arg(long, value_name = "FILE")]
     pub workcell: Option<PathBuf>,
 }

@@ -12,11 +12,11 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, write_states};
 
-/// Relative speed of the fingers, m/s.
+/// Speed of the fingers relative to each other, in m/s.
 const SPEED_M_S: f64 = 0.05;
-/// Target width for closing on an object of unknown width: any final width counts as grasped.
+/// Target width for closing on an object of unknown width. Any final width counts as grasped.
 const ANY_WIDTH_M: f64 = 0.5 * HAND_OPENING_MAX_M;
-/// Maximum continuous grasping force of the hand, N.
+/// Maximum continuous grasping force of the hand, in N.
 const MAX_FORCE_N: f64 = 70.0;
 
 /// `sdg robot open`
@@ -53,7 +53,7 @@ pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
     }
     let (mut arm, _) = args.arm.connect()?;
     let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S }, &args.states)?;
-    // The hand no longer carries anything.
+    // The hand no longer holds an object.
     arm.set_load(Load::NONE)?;
     eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
     Ok(Outcome::Done)

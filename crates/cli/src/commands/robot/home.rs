@@ -23,7 +23,7 @@ pub struct HomeArgs {
     /// Do not ask for confirmation; for programs
     #[arg(long)]
     yes: bool,
-    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    /// Fraction of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     speed: f64,
     /// Drive an arm on the network from a thread without real-time priority; for simulated arms
@@ -43,7 +43,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let Some(path) = &args.arm.workcell else {
-        return Err(Usage("expected --workcell FILE, which says where the arm may be".to_owned()).into());
+        return Err(Usage("expected --workcell FILE, which states where the arm may be".to_owned()).into());
     };
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
@@ -55,7 +55,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let home = workcell.home().unwrap_or_else(ready_pose);
     let motions = if workcell.obstacles.is_empty() {
         let motion = robot.plan_free(&home, &pace.free_limits(robot.geometry()))?;
-        // Check the motion before asking for confirmation.
+        // The motion is checked before the question is asked.
         robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
         vec![motion]
     } else {

@@ -53,7 +53,7 @@ pub fn run(command: &RobotCommand) -> Result<Outcome> {
 
 fn recover(args: &RecoverArgs) -> Result<Outcome> {
     let (mut arm, address) = args.arm.connect()?;
-    let question = format!("Is nothing in the way of the arm at {address}, and may it accept motions again?");
+    let question = format!("Is the space around the arm at {address} clear, and may it accept motions again?");
     if confirm(&question, args.yes)? == Consent::Refused {
         return Ok(Outcome::Done);
     }

@@ -48,7 +48,7 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A pose in the format of the poses' file of `sdg camera hand-eye`.
+/// A pose in the format of a poses file for `sdg camera hand-eye`.
 fn pose(base_from_frame: &Isometry3<f64>) -> Value {
     let (p, r) = (base_from_frame.translation.vector, base_from_frame.rotation.coords);
     json!({"translation_m": p.as_slice(), "rotation_xyzw": r.as_slice()})

@@ -14,14 +14,14 @@ pub struct Ros2Args {
     /// A grasp model written by sdg teach; without it, nothing is detected until the service has taught one
     #[arg(long, value_name = "FILE")]
     pub grasp_model: Option<PathBuf>,
-    /// The camera's file, with its pose over the table; without it and --base-frame, detections have no poses
+    /// The camera file, with the camera's pose above the table; without it and --base-frame, detections have no poses
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
     /// Look up the camera's pose in tf, in this frame: the robot's base; intrinsics come from --camera or from
     /// camera_info
     #[arg(long, value_name = "FRAME")]
     pub base_frame: Option<String>,
-    /// With --base-frame: z of the table in that frame; default: the value in the workcell's file, else 0
+    /// With --base-frame: z of the table in that frame; default: the value in the workcell file, else 0
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pub table_height_mm: Option<f64>,
     /// With --base-frame: maximum difference between the stamps of transform and picture
@@ -87,7 +87,7 @@ pub struct ArmArgs {
     /// Allow the service ~/grasp to move the arm for any caller; without it there is no such service
     #[arg(long, requires_all = ["workcell", "camera"])]
     pub allow_motion: bool,
-    /// The workcell's file
+    /// The workcell file
     #[arg(long, value_name = "FILE")]
     pub workcell: Option<PathBuf>,
     /// Name of the arm's FollowJointTrajectory action
@@ -105,7 +105,7 @@ pub struct ArmArgs {
     /// The gripper's position divided by its opening: 0.5 if the position is that of one finger, 1 if it is the opening
     #[arg(long, value_name = "RATIO", default_value_t = 0.5, value_parser = positive)]
     pub gripper_ratio: f64,
-    /// Share of the joints' velocity limits, above 0 and at most 0.6, unless a request gives another
+    /// Fraction of the joints' velocity limits, above 0 and at most 0.6, unless a request gives another
     #[arg(long, value_name = "SHARE", default_value_t = sdg_robot::DEFAULT_SPEED)]
     pub speed: f64,
     /// The parts' height

@@ -1,4 +1,4 @@
-//! Teaching by the node's services, with the function of `sdg teach`.
+//! Teaching by the node's services, which use the functions of `sdg teach`.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::{TaughtCameraArgs, height_mm};
 
-/// The teaching of the Trigger service, if its arguments are given.
+/// The teaching of the Trigger service; `None` without its arguments.
 pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
     Some(TeachJob {
         photo: args.teach_demo.clone()?,
@@ -28,10 +28,10 @@ pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
     })
 }
 
-/// Teaches and writes the model; `camera` is the file of the node's camera.
+/// Teaches a model and writes it; `camera` is the node's camera file.
 ///
 /// # Errors
-/// Those of `sdg teach`; a height of marks without a camera.
+/// The errors of `sdg teach`; or a height of marks is given without a camera.
 pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
     let demonstration = match &job.marks {
         Some(marks) => (job.photo.clone().into(), marks.clone()),

@@ -1,4 +1,4 @@
-//! Compares two runs on the same pictures: whether their models differ, and how many pictures would show it.
+//! Compares two runs on the same pictures: whether their models differ, and the number of pictures that would show it.
 
 use std::path::{Path, PathBuf};
 
@@ -20,22 +20,23 @@ use crate::simulated::store::read_stored;
 use crate::simulated::tables::Titled;
 use crate::statistics::Share;
 
-/// Name of the sum over all axes that show the part.
+/// Name of the sum over all axes with the part in the pictures.
 pub const ALL_WITH_PART: &str = "all with the part";
 
 /// A model in two runs on the same pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunDifference {
     pub group: PartGroup,
-    /// The axis' name, or [`ALL_WITH_PART`].
+    /// The name of the axis, or [`ALL_WITH_PART`].
     pub axis: &'static str,
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Cases by which run answered them correctly: this run, the other one.
+    /// Number of cases by the runs that were correct: this run first, then the other one.
     pub counts: PairedCounts,
-    /// This run's share minus the other's, and its 95 % confidence interval.
+    /// This run's fraction minus the other's.
     pub difference: f64,
+    /// 95 % confidence interval of the difference.
     pub interval: [f64; 2],
     /// Whether the interval excludes zero.
     pub differs: bool,
@@ -43,13 +44,13 @@ pub struct RunDifference {
     pub cases_needed: Option<usize>,
 }
 
-/// Another run's folder.
+/// The folder of another run.
 pub struct Against {
     folder: PathBuf,
 }
 
 impl Against {
-    /// Checks that a folder contains an evaluation. It is only read: another process may be writing to it.
+    /// Checks that a folder contains an evaluation. The folder is only read: another process may be writing to it.
     ///
     /// # Errors
     /// The folder has no results of axes.
@@ -64,10 +65,10 @@ impl Against {
         &self.folder
     }
 
-    /// Compares each model with itself in the other run, if both were shown the same pictures.
+    /// Compares each model with itself in the other run, if both runs have the same pictures.
     ///
     /// # Errors
-    /// Records cannot be read, or are of other pictures.
+    /// Records cannot be read, or have other pictures.
     pub fn compare(&self, evaluation: &AxesEvaluation) -> Result<Vec<RunDifference>> {
         let mut comparisons = Vec::new();
         for group in PartGroup::ALL {
@@ -116,7 +117,7 @@ impl Against {
 
     /// The detections of the other run's model, after a check that the pictures are the same.
     fn record(&self, cell: Cell, axis: Axis, settings: &AxisSettings) -> Result<Option<AxisRecord>> {
-        /// The settings that determine the pictures; teaching and search may differ, and are compared.
+        /// The settings that determine the pictures. Teaching and search may differ, and are compared.
         #[derive(Serialize)]
         struct PictureSettings {
             axes: u32,
@@ -135,7 +136,7 @@ impl Against {
 }
 
 impl RunDifference {
-    /// `None` if there are no cases.
+    /// The comparison; `None` if there are no cases.
     fn new(group: PartGroup, axis: &'static str, model: ModelKind, way: Way, counts: PairedCounts) -> Option<Self> {
         Some(Self {
             group,
@@ -160,7 +161,7 @@ pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Ti
             (!rows.is_empty()).then(|| Titled {
                 title: format!("{}: against {against}", group.title()),
                 lead: "Both runs on the same pictures; right is an instance found or a look-alike refused. The interval of \
-                       the difference is Newcombe's for paired shares (1998, method 10), 95 %: a difference is shown if it \
+                       the difference is Newcombe's for paired fractions (1998, method 10), 95 %: a difference is shown if it \
                        excludes zero. Cases needed: number of cases that shows a difference of this size with 80 % power at the 5 % \
                        level, two-sided, by McNemar's test (Connor, 1987). Instances of one picture are counted as if they \
                        were independent."

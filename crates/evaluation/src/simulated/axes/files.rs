@@ -13,8 +13,8 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl AxesSummary {
-    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, `against` contains
-    /// the comparisons with another run and its folder, and `command` reproduces the results.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, `against` has the
+    /// comparisons with another run and its folder, and `command` reproduces the results.
     ///
     /// # Errors
     /// Files cannot be written.
@@ -30,8 +30,8 @@ impl AxesSummary {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("seconds of a worker", self.seconds.to_string()),
-            ("side by side", format!("{jobs} units of work")),
+            ("worker seconds", self.seconds.to_string()),
+            ("in parallel", format!("{jobs} units of work")),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];

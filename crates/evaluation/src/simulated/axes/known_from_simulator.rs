@@ -1,4 +1,4 @@
-//! Quantities that the simulated robot gets from the simulator and that must be measured for a real one.
+//! Quantities that the simulated robot gets from the simulator, and that would have to be measured for a real one.
 
 /// A quantity given to the simulated robot.
 pub(super) struct Given {
@@ -6,7 +6,7 @@ pub(super) struct Given {
     pub what: &'static str,
     /// Its source.
     pub source: &'static str,
-    /// The error under which grasps are tested, if any.
+    /// The error under which grasps are tested.
     pub error: &'static str,
 }
 
@@ -16,7 +16,7 @@ pub(super) fn known_from_simulator() -> [Given; 13] {
     [
         given(
             "box, outline, grasp marks of the demonstration",
-            "projected and drawn from the part's own geometry, vertices as a careful person clicks them",
+            "projected and drawn from the part's own geometry, vertices as a careful person marks them",
             "jittered by 3 px",
         ),
         given("the part's rotational symmetry, at teaching", "its description (object.json)", "none"),
@@ -29,10 +29,15 @@ pub(super) fn known_from_simulator() -> [Given; 13] {
         given("pose of the arm at each picture", "the simulated joints, without encoder errors", "none"),
         given("camera in the hand (hand-eye)", "the model of the arm", "2 mm and 0.5°"),
         given("height of the table", "the simulated table, flat and level at z = 0", "none"),
-        given("height of the marks over the table", "the part's description (object.json)", "3 mm"),
-        given("height of the grasp over the table", "the part's description (object.json)", "none"),
-        given("the area where parts lie", "scenes place the part where the look-out pose shows it whole", "none"),
-        given("that the part rests on the face it was shown on", "scenes place it so", "none"),
+        given("height of the marks above the table", "the part's description (object.json)", "3 mm"),
+        given("height of the grasp above the table", "the part's description (object.json)", "none"),
+        given(
+            "the area where parts lie",
+            "scenes place the part where it is completely visible from the look-out \
+               pose",
+            "none",
+        ),
+        given("the face on which the part rests", "the same as in the demonstration", "none"),
         given("dynamics of the arm for its controller", "the simulated arm's own mass matrix", "none"),
         given(
             "friction of the pads",

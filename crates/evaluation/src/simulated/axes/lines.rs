@@ -4,7 +4,7 @@ use super::against::RunDifference;
 use super::summary::AxesSummary;
 use super::way::Way;
 
-/// One line for each model in each group and way, and for each error.
+/// One line for each model in each group and way, and one for each error.
 pub fn summary_lines(summary: &AxesSummary) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");
@@ -43,7 +43,7 @@ pub fn summary_lines(summary: &AxesSummary) -> String {
     text
 }
 
-/// One line per comparison.
+/// One line for each comparison.
 pub fn difference_lines(comparisons: &[RunDifference]) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");

@@ -12,9 +12,9 @@ use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
 /// Compares detections (best first) with the instances of a part.
 ///
-/// If there is at most one instance, only the best detection counts, as in the paper's protocol: a robot would go
-/// there. Several instances are matched one to one: each detection in order takes the nearest correct instance that is
-/// still free.
+/// If there is at most one instance, only the best detection counts, as in the paper's protocol, because a robot would
+/// grasp there. Several instances are matched one to one: in order of decreasing score, each detection takes the
+/// nearest free instance for which it is correct.
 pub(super) fn place(
     object: &ObjectSpec,
     camera: &PosedCamera,
@@ -61,7 +61,7 @@ fn nearest(errors: &[Option<DetectionError>]) -> Option<DetectionError> {
     errors.iter().flatten().copied().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm))
 }
 
-/// The instance found by each detection; `errors` has the errors of every detection, best first, against every
+/// The instance that each detection finds; `errors` has the errors of every detection, best first, relative to every
 /// instance.
 pub(crate) fn match_one_to_one(errors: &[Vec<Option<DetectionError>>], accepted: &[bool]) -> Vec<Option<usize>> {
     let mut is_taken = vec![false; errors.first().map_or(0, Vec::len)];
@@ -94,7 +94,8 @@ mod tests {
 
     #[test]
     fn each_instance_is_found_once_and_by_the_best() {
-        // The second detection is nearer, but the first is better; the third is turned; the fourth has no position.
+        // The second detection is nearer, but the first has a higher score; the third is rotated; the fourth has no
+        // position.
         let errors = [
             vec![error(4.0, 1.0), error(80.0, 1.0)],
             vec![error(1.0, 1.0), error(79.0, 1.0)],
@@ -155,7 +156,7 @@ mod tests {
         assert_eq!((answer.detections.len(), answer.num_wrong()), (3, 1));
         assert!(answer.detections[0].error_mm.unwrap() < 1e-6 && answer.detections[1].error_mm.unwrap() > 20.0);
 
-        // With one instance the best detection decides, and here it is elsewhere.
+        // With one instance, the best detection decides, and its position is wrong.
         let answer = place(&object, &camera, &detections[1..], &instances[..1]);
         assert_eq!((answer.detections.len(), answer.num_wrong(), answer.has_found(0)), (1, 1, false));
         // Without the part, every accepted detection is wrong.

@@ -1,14 +1,14 @@
 //! Axes along which the paper's protocol is made more difficult, one at a time, and grasps under errors.
 //!
 //! ```text
-//! AxesEvaluation ─ units: teachings (the protocol's, and from jittered marks), pictures of a part and axis, attempts
+//! AxesEvaluation ─ units: teachings (as in the protocol, and from jittered marks), pictures of a part and axis, attempts
 //!       │                                    │
-//!       │              each picture drawn once, shown to every model, with the check and to the network alone
-//!       └─ Store ─ AxesSummary (the paper's parts, and apart from them the held-out ones) ─ Markdown, JSON, page
+//!       │              each picture rendered once, searched by every model, with the check and by the network alone
+//!       └─ Store ─ AxesSummary (the paper's parts and the held-out ones separately) ─ Markdown, JSON, page
 //! ```
 //!
 //! A **case** is an instance of the part in a picture, or a look-alike: the unit for comparing two models. A
-//! **condition** is the error in an attempt. Pictures depend only on part, axis, number and seed; attempts use the
+//! **condition** is the error in an attempt. Pictures depend only on part, axis, number and seed; attempts have the
 //! scenes of the paper's protocol.
 
 mod against;

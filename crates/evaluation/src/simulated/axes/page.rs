@@ -9,7 +9,7 @@ use super::way::Way;
 use crate::footer::FOOTER;
 use crate::simulated::tables::{Titled, this_run};
 
-/// The shares at a glance, then all tables; `more` are additional tables.
+/// The page: charts of the fractions, then all tables; `more` are additional tables.
 pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> Report {
     let mut report = Report::new("Axes and grasps under errors").kicker("Evaluation in simulation").lead(
         "Detections of the models in pictures with one difficulty at a time, and grasps with one error in the robot's settings. \
@@ -23,7 +23,7 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
             report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
         }
     }
-    // In the first section of the page.
+    // The notice is in the first section of the page.
     let mut notice = notice(summary);
     let mut begun = |section: Section| match notice.take() {
         Some(notice) => section.notice(Tone::Warning, notice),
@@ -38,7 +38,7 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
     report.section(this_run(facts, command)).footer(FOOTER)
 }
 
-/// For each model, the axis with the smallest share found, with the check.
+/// For each model, the axis with the smallest fraction found, with the check.
 fn worst_axes(group: &GroupSummary) -> Vec<(ModelKind, &AxisFigures)> {
     let mut worst: Vec<(ModelKind, &AxisFigures)> = Vec::new();
     for figures in group.axes.iter().filter(|figures| figures.way == Way::WithCheck && figures.found.of > 0) {
@@ -51,7 +51,7 @@ fn worst_axes(group: &GroupSummary) -> Vec<(ModelKind, &AxisFigures)> {
     worst
 }
 
-/// One chart per axis and per error.
+/// One chart for each axis and each error.
 fn plots(group: &GroupSummary, mut section: Section) -> Section {
     let percent = |interval: [f64; 2]| interval.map(|share| 100.0 * share);
     let mut axes: Vec<&str> = group.axes.iter().map(|figures| figures.axis).collect();

@@ -1,4 +1,4 @@
-//! Two shares of the same cases: their difference with its uncertainty, and the number of cases that would show it.
+//! Two fractions of the same cases: their difference with its interval, and the number of cases that would show it.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ const Z_TWO_SIDED_5_PERCENT: f64 = 1.959_963_984_540_054;
 /// 80 % quantile of the normal distribution.
 const Z_POWER_80_PERCENT: f64 = 0.841_621_233_572_914;
 
-/// Outcomes of cases tried by two models: four counts.
+/// Outcomes of two models on the same cases, as four counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct PairedCounts {
     /// Cases solved by both.
@@ -38,17 +38,17 @@ impl PairedCounts {
         self.both + self.first_only + self.second_only + self.neither
     }
 
-    /// Share solved by the first.
+    /// Fraction solved by the first model.
     pub fn first(self) -> Share {
         Share { count: self.both + self.first_only, of: self.total() }
     }
 
-    /// Share solved by the second.
+    /// Fraction solved by the second model.
     pub fn second(self) -> Share {
         Share { count: self.both + self.second_only, of: self.total() }
     }
 
-    /// The first share minus the second; `None` without cases.
+    /// The first fraction minus the second; `None` without cases.
     pub fn difference(self) -> Option<f64> {
         let n = self.total();
         (n > 0).then(|| (self.first_only as f64 - self.second_only as f64) / n as f64)
@@ -58,7 +58,7 @@ impl PairedCounts {
     ///
     /// # Source
     /// R. G. Newcombe, "Improved confidence intervals for the difference between binomial proportions based on paired
-    /// data", Statistics in Medicine 17, 1998, method 10: Wilson's intervals of both shares, squared and added, with
+    /// data", Statistics in Medicine 17, 1998, method 10: Wilson's intervals of both fractions, squared and added, with
     /// the correlation of the cases, which is corrected for continuity if it is positive.
     pub fn difference_interval(self) -> Option<[f64; 2]> {
         let difference = self.difference()?;
@@ -90,7 +90,7 @@ impl PairedCounts {
     }
 
     /// Number of cases that would show a difference of this size with 80 % power at the 5 % level, two-sided, by
-    /// McNemar's test; `None` if the shares are equal.
+    /// McNemar's test; `None` if both fractions are equal.
     ///
     /// # Source
     /// R. J. Connor, "Sample size for testing differences in proportions for the paired-sample design", Biometrics 43,
@@ -130,7 +130,7 @@ impl std::iter::Sum for PairedCounts {
 mod tests {
     use super::*;
 
-    /// Precision of the references.
+    /// Precision of the reference values.
     const TOLERANCE: f64 = 5e-5;
 
     fn counts(both: usize, first_only: usize, second_only: usize, neither: usize) -> PairedCounts {
@@ -139,8 +139,8 @@ mod tests {
 
     #[test]
     fn newcombe_s_interval_agrees_with_known_values() {
-        // The first is in Newcombe's table II; the second is tested by the R package contingencytables (Cavo et al.,
-        // 2012); the third was computed in another language.
+        // The first case is in Newcombe's table II; the second is a test of the R package contingencytables (Cavo et
+        // al., 2012); the third was computed in another language.
         for (counts, low, high) in [
             (counts(36, 12, 2, 0), 0.0569, 0.3404),
             (counts(59, 6, 16, 80), -0.1186, -0.0046),
@@ -155,7 +155,8 @@ mod tests {
 
     #[test]
     fn connor_s_number_of_cases_agrees_with_known_values() {
-        // powerandsamplesize.com: discordant shares of 0.45 and 0.05 need 23 pairs; the other was computed by hand.
+        // From powerandsamplesize.com: discordant fractions of 0.45 and 0.05 need 23 pairs. The other case was computed
+        // by hand.
         assert_eq!(counts(5, 1, 9, 5).cases_needed(), Some(23));
         assert_eq!(counts(80, 10, 5, 5).cases_needed(), Some(469));
         assert_eq!(counts(80, 5, 5, 10).cases_needed(), None);

@@ -1,4 +1,4 @@
-//! Records of the pictures of an axis, as stored.
+//! Stored records of the pictures of an axis.
 
 use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
@@ -8,24 +8,24 @@ use super::way::Way;
 /// A detection compared with the nearest instance of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlacedDetection {
-    /// Its score; accepted from 0.5.
+    /// Score of the detection; accepted from 0.5.
     pub score: f64,
     /// The network's own score.
     pub network_score: f64,
-    /// Agreement of the demonstration there, if it was checked.
+    /// Agreement with the demonstration at the detection, if it was checked.
     pub agreement: Option<f64>,
     /// Position error, in millimetres; `None` without an instance or a position on the table.
     pub error_mm: Option<f64>,
     /// Angle error, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// The instance that it found: within 10 mm and 10°, and not found by a better detection.
+    /// The instance that the detection found: within 10 mm and 10°, and not found by a better detection.
     pub found: Option<usize>,
 }
 
-/// A model's detections in a picture: all accepted ones, best first; the best refused one if none is accepted.
+/// A model's detections in a picture: all accepted ones, best first, or the best refused one if none is accepted.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// If there is at most one instance, only the best.
+    /// The detections; only the best one if there is at most one instance.
     pub detections: Vec<PlacedDetection>,
 }
 
@@ -37,7 +37,7 @@ impl PlacedDetection {
 }
 
 impl Answer {
-    /// Whether anything is accepted.
+    /// Whether any detection is accepted.
     pub fn is_accepted(&self) -> bool {
         self.detections.iter().any(PlacedDetection::is_accepted)
     }
@@ -47,7 +47,7 @@ impl Answer {
         self.detections.iter().any(|detection| detection.found == Some(instance))
     }
 
-    /// Number of accepted detections that are not right.
+    /// Number of accepted detections that found no instance.
     pub fn num_wrong(&self) -> usize {
         self.detections.iter().filter(|detection| detection.is_accepted() && detection.found.is_none()).count()
     }
@@ -62,31 +62,31 @@ pub struct LookAlike {
     pub differs_in_size_alone: bool,
 }
 
-/// A picture of an axis and a model's detections in it.
+/// A picture of an axis, and a model's detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxisPicture {
-    /// Index among the axis' pictures.
+    /// Index among the pictures of the axis.
     pub number: u64,
-    /// Value of the axis' parameter.
+    /// Value of the parameter of the axis.
     pub parameter: f64,
     /// Unit of the parameter.
     pub unit: String,
-    /// Visible share of each instance; empty without the part.
+    /// Visible fraction of each instance; empty without the part.
     pub visible: Vec<f64>,
-    /// The look-alike in place of the part.
+    /// The look-alike that replaces the part.
     pub look_alike: Option<LookAlike>,
-    /// With the check against the demonstration.
+    /// Detections with the check against the demonstration.
     pub verified: Answer,
-    /// Of the network alone; `None` for a model without one.
+    /// Detections of the network alone; `None` for a model without a network.
     pub alone: Option<Answer>,
 }
 
-/// A model on the pictures of one part and axis.
+/// The results of a model in the pictures of one part and axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxisRecord {
-    /// One per picture, in order.
+    /// One record per picture, in order.
     pub pictures: Vec<AxisPicture>,
-    /// Worker time of this model's detections and its share of rendering, in seconds.
+    /// Worker time in seconds: this model's detections, and its portion of the rendering.
     pub seconds: f64,
 }
 
@@ -94,7 +94,7 @@ pub struct AxisRecord {
 pub type Case = (u64, usize);
 
 impl AxisPicture {
-    /// The detections made in one way.
+    /// The detections of one way.
     fn answer(&self, way: Way) -> Option<&Answer> {
         match way {
             Way::WithCheck => Some(&self.verified),
@@ -104,12 +104,12 @@ impl AxisPicture {
 }
 
 impl AxisRecord {
-    /// The detections in each picture made in one way; empty for a model without that way.
+    /// The detections in each picture for one way; empty for a model that does not have this way.
     pub fn answers(&self, way: Way) -> impl Iterator<Item = &Answer> {
         self.pictures.iter().filter_map(move |picture| picture.answer(way))
     }
 
-    /// Each case with whether it was answered correctly: an instance found, a look-alike refused.
+    /// Each case, and whether the model was correct: an instance found, or a look-alike refused.
     pub fn outcomes(&self, axis: Axis, way: Way) -> Vec<(Case, bool)> {
         let mut outcomes = Vec::new();
         for picture in &self.pictures {

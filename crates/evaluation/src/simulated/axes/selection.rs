@@ -1,4 +1,4 @@
-//! The measurements beyond the paper's protocol, by name: axes of pictures, and grasps under errors.
+//! Measurements in addition to the paper's protocol, by name: axes of pictures, and grasps under errors.
 
 use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GraspCondition {
-    /// None: the paper's protocol.
+    /// No error: the paper's protocol.
     NoError,
-    /// The demonstration's grasp marks, box and outline.
+    /// An error of the demonstration's grasp marks, box and outline.
     Marks,
-    /// The height of the marks.
+    /// An error of the height of the marks.
     MarkHeight,
-    /// The camera's pose in the hand.
+    /// An error of the camera's pose in the hand.
     HandEye,
     Friction,
     /// No error, but the hand shakes after lifting.
@@ -21,7 +21,7 @@ pub enum GraspCondition {
 }
 
 impl GraspCondition {
-    /// All conditions, the control first.
+    /// All conditions; the control is the first.
     pub const ALL: [Self; 6] =
         [Self::NoError, Self::Marks, Self::MarkHeight, Self::HandEye, Self::Friction, Self::Shake];
 
@@ -37,7 +37,7 @@ impl GraspCondition {
         }
     }
 
-    /// A description for tables.
+    /// The description in tables.
     pub fn description(self) -> &'static str {
         match self {
             Self::NoError => "no error (control)",
@@ -50,14 +50,14 @@ impl GraspCondition {
     }
 }
 
-/// Name of all axes of pictures.
+/// Name for all axes of pictures.
 const ALL_PICTURES: &str = "pictures";
-/// Name of all grasps under errors, including the control.
+/// Name for all grasps under errors, including the control.
 const ALL_GRASPS: &str = "grasps";
-/// Name of all measurements.
+/// Name for all measurements.
 const EVERYTHING: &str = "all";
 
-/// Axes and conditions, each once, in the order of the reports.
+/// Axes and conditions, each at most once, in the order of the reports.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Selection {
     pub axes: Vec<Axis>,
@@ -68,7 +68,7 @@ impl Selection {
     /// Parses names; an empty list selects everything.
     ///
     /// # Errors
-    /// An unknown name, in a sentence that lists the known ones.
+    /// A name is unknown; the error lists the known ones.
     pub fn parse(names: &[String]) -> Result<Self, String> {
         let mut selection = Self::default();
         let everything = [EVERYTHING.to_owned()];

@@ -1,4 +1,4 @@
-//! Sums of the records of axes and of grasps under errors, by model and group of parts.
+//! Sums of the records of axes and of grasps under errors, for each model and group of parts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,7 +19,7 @@ use crate::simulated::groups::PartGroup;
 use crate::simulated::records::{AttemptRecord, TeachingRecord};
 use crate::statistics::{Share, wilson_interval};
 
-/// All results. Remaining units are missing in the sums; `remaining` is their number.
+/// All results. The sums lack the remaining units.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxesSummary {
     /// Settings of the pictures' results.
@@ -28,18 +28,18 @@ pub struct AxesSummary {
     pub grasp_settings: GraspSettings,
     /// Number of remaining units.
     pub remaining: usize,
-    /// Worker seconds of the results, including teachings.
+    /// Worker seconds of the results, including the teachings.
     pub seconds: Seconds,
-    /// The paper's parts, and separately the held-out ones; groups without parts are missing.
+    /// The paper's parts, and separately the held-out parts; groups without parts are missing.
     pub groups: Vec<GroupSummary>,
 }
 
 /// Worker seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Of all teachings of the measured models.
+    /// Seconds of all teachings of the measured models.
     pub teaching: f64,
-    /// Of pictures: rendering and detection.
+    /// Seconds of pictures: rendering and detection.
     pub pictures: f64,
     pub grasps: f64,
 }
@@ -58,19 +58,19 @@ impl Seconds {
     }
 }
 
-/// A group of parts: one row for each model, axis and way.
+/// The results of a group of parts: one row for each model, axis and way.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroupSummary {
     pub group: PartGroup,
     pub objects: Vec<String>,
-    /// Pictures with the part.
+    /// Results in pictures with the part.
     pub axes: Vec<AxisFigures>,
-    /// Pictures with a look-alike in place of the part.
+    /// Results in pictures in which a look-alike replaces the part.
     pub look_alikes: Vec<LookAlikeFigures>,
     pub grasps: Vec<GraspFigures>,
 }
 
-/// The share of one part.
+/// The fraction of one part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartShare {
     pub object: String,
@@ -84,35 +84,35 @@ pub struct AxisFigures {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Instances of the part found within 10 mm and 10°, of all in the pictures.
+    /// Instances of the part that were found within 10 mm and 10°, of all in the pictures.
     pub found: Share,
-    /// Its 95 % confidence interval (Wilson).
+    /// 95 % confidence interval (Wilson) of `found`.
     pub found_interval: [f64; 2],
-    /// Number of accepted detections that are not right.
+    /// Number of accepted detections that found no instance.
     pub wrong: usize,
     /// Number of pictures.
     pub pictures: usize,
-    /// Median and 90th percentile of the position errors of accepted detections, right or not, in millimetres.
+    /// Median and 90th percentile of the position errors of all accepted detections, in millimetres.
     pub distance_mm: Option<[f64; 2]>,
-    /// The same for angle errors, in degrees.
+    /// Median and 90th percentile of the angle errors of all accepted detections, in degrees.
     pub turn_deg: Option<[f64; 2]>,
-    /// The share found in the first, the middle and the last third of the axis' pictures: the axis' parameter grows
-    /// from the first picture to the last.
+    /// The fraction found in the first, the middle and the last third of the axis' pictures; the parameter of the axis
+    /// increases from the first picture to the last.
     pub thirds: [Third; 3],
-    /// The share of each part.
+    /// The fraction of each part.
     pub parts: Vec<PartShare>,
 }
 
-/// A third of an axis' pictures.
+/// A third of the pictures of an axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Third {
     /// Instances of the part that were found.
     pub found: Share,
-    /// Range of the axis' parameter; `None` without pictures.
+    /// Range of the parameter of the axis; `None` without pictures.
     pub range: Option<[f64; 2]>,
 }
 
-/// How often a model accepted a look-alike as the part.
+/// The fraction of look-alikes that a model accepted as the part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LookAlikeFigures {
     /// The kind of look-alike, or one of the sums [`Self::SAME_SIZE`] and [`Self::SIZE_ALONE`].
@@ -120,11 +120,11 @@ pub struct LookAlikeFigures {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Pictures in which it was accepted.
+    /// Pictures in which the look-alike was accepted.
     pub accepted: Share,
-    /// Its 95 % confidence interval (Wilson).
+    /// 95 % confidence interval (Wilson) of `accepted`.
     pub accepted_interval: [f64; 2],
-    /// The share of each part.
+    /// The fraction of each part.
     pub parts: Vec<PartShare>,
 }
 
@@ -134,7 +134,7 @@ impl LookAlikeFigures {
     /// The sum over look-alikes that differ only in size, which is not visible without a calibrated camera.
     pub const SIZE_ALONE: &str = "size alone";
 
-    /// Whether it is one of the sums.
+    /// Whether the kind is one of the sums.
     pub fn is_sum(&self) -> bool {
         [Self::SAME_SIZE, Self::SIZE_ALONE].contains(&self.kind.as_str())
     }
@@ -145,23 +145,23 @@ impl LookAlikeFigures {
 pub struct GraspFigures {
     pub condition: GraspCondition,
     pub model: ModelKind,
-    /// Attempts that held the part.
+    /// Attempts that held the part, of all attempts.
     pub held: Share,
-    /// Its 95 % confidence interval (Wilson).
+    /// 95 % confidence interval (Wilson) of `held`.
     pub held_interval: [f64; 2],
-    /// Attempts held with both detections from a first look, of all attempts.
+    /// Attempts that held the part, and found it in the first picture both from afar and from above; of all attempts.
     pub held_at_first_look: Share,
-    /// Attempts held after further looks, of all attempts.
+    /// Attempts that held the part after further pictures, of all attempts.
     pub held_after_further_looks: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,
-    /// Median and 90th percentile of the last detections' position errors, in millimetres.
+    /// Median and 90th percentile of the position errors of the last detections, in millimetres.
     pub distance_mm: Option<[f64; 2]>,
-    /// The share of each part.
+    /// The fraction of each part.
     pub parts: Vec<PartShare>,
 }
 
-/// The part with the smallest share.
+/// The part with the smallest fraction.
 pub fn lowest(parts: &[PartShare]) -> Option<&PartShare> {
     parts.iter().min_by(|a, b| {
         let percent = |part: &PartShare| part.share.percent().unwrap_or(f64::INFINITY);
@@ -169,7 +169,7 @@ pub fn lowest(parts: &[PartShare]) -> Option<&PartShare> {
     })
 }
 
-/// Median and 90th percentile.
+/// The median and the 90th percentile.
 fn spread(values: &[f64]) -> Option<[f64; 2]> {
     Some([percentile(values.iter().copied(), 50.0)?, percentile(values.iter().copied(), 90.0)?])
 }
@@ -224,7 +224,7 @@ fn axes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) ->
     Ok(figures)
 }
 
-/// The records of each part; `None` if teaching gave no model; no entry if it was not measured yet.
+/// The records of each part: `None` if the teaching gave no model; no entry if the part was not measured yet.
 fn records<'o>(
     evaluation: &AxesEvaluation,
     objects: &[&'o str],
@@ -243,7 +243,7 @@ fn records<'o>(
     Ok(records)
 }
 
-/// Without a model, every instance counts as missed.
+/// The results of a model along an axis. Without a model, every instance counts as missed.
 fn axis_figures(
     axis: Axis,
     model: ModelKind,
@@ -280,7 +280,7 @@ fn axis_figures(
     }
 }
 
-/// A third of the pictures of all parts.
+/// A third of the pictures, over all parts.
 fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item = &'r AxisRecord>) -> Third {
     let mut sum = Third::default();
     for record in records {
@@ -296,7 +296,8 @@ fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item 
     sum
 }
 
-/// By kind, followed by the two sums. Models that could not be taught are left out, because they accept nothing.
+/// The results by kind of look-alike, followed by the two sums. Models that could not be taught are left out, because
+/// they accept nothing.
 fn look_alikes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<LookAlikeFigures>> {
     let mut figures = Vec::new();
     if !evaluation.selection.axes.contains(&Axis::LookAlikes) {
@@ -402,7 +403,7 @@ fn grasp_figures(condition: GraspCondition, model: ModelKind, by_part: &[(&str, 
     }
 }
 
-/// The time of the measured models' teachings, each counted once.
+/// The time of the teachings of the measured models, each counted once.
 fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
     let mut taught: Vec<(ModelKind, Marks)> =
         evaluation.models.iter().map(|model| (model.taught_as(), Marks::Shipped)).collect();

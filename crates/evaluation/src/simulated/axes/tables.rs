@@ -1,4 +1,4 @@
-//! The results of each axis and each error as tables: the paper's parts, and separately the others.
+//! Tables of the results of each axis and each error, for the paper's parts and separately for the held-out ones.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table, Tone};
@@ -11,7 +11,7 @@ use crate::simulated::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// All tables, group by group, followed by the quantities given to the robot.
+/// All tables, group by group, followed by the quantities that the robot gets from the simulator.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     let mut tables = Vec::new();
     for group in &summary.groups {
@@ -46,12 +46,12 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     tables
 }
 
-/// A notice to precede the numbers.
+/// A notice that precedes the tables, if results are missing.
 pub fn notice(summary: &AxesSummary) -> Option<String> {
     incomplete(summary.remaining)
 }
 
-/// The tables as a separate document; `more` are additional tables, `facts` the settings for reproducing the numbers.
+/// The tables as a document; `more` are additional tables, `facts` the settings for reproducing the results.
 pub fn markdown(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> String {
     let tables = tables(summary).into_iter().chain(more);
     document("Axes and grasps under errors", notice(summary), tables, facts, command)
@@ -81,7 +81,7 @@ fn figures_of<'g>(group: &'g GroupSummary, axis: &str, model: ModelKind, way: Wa
     group.axes.iter().find(|f| f.axis == axis && f.model == model && f.way == way)
 }
 
-/// The share in percent with its interval: `97.5 (93.8 to 99.0)`.
+/// The fraction in percent with its interval, such as `97.5 (93.8 to 99.0)`.
 pub(super) fn with_interval(share: Share, [low, high]: [f64; 2]) -> String {
     let Some(percent) = share.percent() else { return "–".to_owned() };
     format!("{percent:.1} ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
@@ -91,7 +91,7 @@ fn part_name(object: &str) -> String {
     object.replace('_', " ")
 }
 
-/// The smallest share and its part.
+/// The smallest fraction, and its part.
 fn lowest_shares(parts: &[PartShare]) -> String {
     lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
 }
@@ -111,9 +111,8 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
         table = table.row(row);
     }
     let lead = format!(
-        "Share of the part's instances that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
-         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are matched one to one. \
-         Each axis has its own pictures, the same for every model; models are not given the camera's height."
+        "Instances of the part that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
+         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are matched one to one. Each axis has its own pictures, the same for every model. The models do not know the camera's height."
     );
     (format!("found, {}", way.name()), lead, table)
 }
@@ -126,7 +125,7 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
     for axis in axes_of(group) {
         let of = |model: ModelKind, third: usize| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
         let range = |third: usize| models.iter().find_map(|model| of(*model, third)?.range);
-        // Three instances are three instances in every third.
+        // If there are always three instances, the parameter has the same range in every third.
         if range(0) == range(2) && range(0).is_some_and(|[low, high]| low == high) {
             continue;
         }
@@ -137,10 +136,11 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, in which the axis changes \
-                increasingly: height in shares of the usual one, tilt in degrees, covered in shares of the part, dark in shares \
-                of the usual light, blur in pixels; the parameters of the others are counts or ratios.";
-    ("found, by how much the axis changes".to_owned(), lead.to_owned(), table)
+    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, along which the \
+                difficulty increases: height relative to the usual one, tilt in degrees, covered as a fraction of the \
+                part, dark as a fraction of the usual light, blur in pixels; the parameters of the other axes are \
+                counts or ratios.";
+    ("found, by difficulty along the axis".to_owned(), lead.to_owned(), table)
 }
 
 fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
@@ -158,7 +158,7 @@ fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
         }
         table = table.row(row);
     }
-    ("the part found least often".to_owned(), "Instances found of the part with the lowest share.".to_owned(), table)
+    ("the part found least often".to_owned(), "Instances found of the part with the lowest fraction.".to_owned(), table)
 }
 
 fn wrong(group: &GroupSummary) -> (String, String, Table) {
@@ -177,8 +177,8 @@ fn wrong(group: &GroupSummary) -> (String, String, Table) {
         }
         table = table.row(row);
     }
-    let lead = "Accepted detections (score 0.5 and above) with a wrong position or angle. With one instance, at most one \
-                per picture.";
+    let lead = "Accepted detections (score 0.5 and above) that are not correct: beside the part, rotated relative to \
+                it, or elsewhere. With one instance, there is at most one per picture.";
     ("wrong detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -201,8 +201,8 @@ fn errors(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "Median and 90th percentile of the errors of position on the table and of the angle, of all accepted \
-                detections, right or wrong, modulo the part's symmetry.";
+    let lead = "Median and 90th percentile of the position errors on the table and of the angle errors of all \
+                accepted detections, correct or not, modulo the part's symmetry.";
     ("errors of detections".to_owned(), lead.to_owned(), table)
 }
 
@@ -213,7 +213,7 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
     columns.extend(shown.iter().map(|(way, model)| Column::text(model.letter()).group(way.name())));
     let mut table = Table::new(columns);
     let mut kinds = distinct(group.look_alikes.iter().map(|figures| figures.kind.as_str()));
-    // The two sums last: their order of appearance depends on the first model's look-alikes.
+    // The two sums come last, because their order of appearance depends on the first model's look-alikes.
     let sums = [LookAlikeFigures::SAME_SIZE, LookAlikeFigures::SIZE_ALONE];
     kinds.retain(|kind| !sums.contains(kind));
     for kind in kinds.into_iter().chain(sums) {
@@ -230,10 +230,10 @@ fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
         }));
         table = table.row(row);
     }
-    let lead = "Pictures with a similar part instead of the taught one, and how often it was accepted: lower is better. \
-                Sums in percent, with Wilson's 95 % interval. A difference in size alone cannot be recognised without a \
-                calibrated camera, so the two sums are separate.";
-    ("look-alikes taken for the part".to_owned(), lead.to_owned(), table)
+    let lead = "Pictures in which a similar part replaces the taught one, and how often it was accepted: lower is \
+                better. Sums in percent, with Wilson's 95 % interval. A difference in size alone \
+                is not visible without a calibrated camera, so there are two sums.";
+    ("look-alikes accepted as the part".to_owned(), lead.to_owned(), table)
 }
 
 fn grasps(group: &GroupSummary) -> (String, String, Table) {
@@ -260,9 +260,9 @@ fn grasps(group: &GroupSummary) -> (String, String, Table) {
         ]);
     }
     let lead = "Grasp attempts with the check, the same scenes and robot starts under every error. Held at the first look: the \
-                part was found in the first picture from the look-out pose and in the first from above it. After further \
-                looks: the camera was moved for at least one more picture. The last column is the median and 90th percentile \
-                of the last detection's error, as the robot computes it.";
+                part was found in the first picture from the look-out pose and in the first from above it. After \
+                further looks: the camera was moved for at least one further picture. The last column is the median \
+                and the 90th percentile of the last detection's position error, as the robot computes it.";
     ("grasps under errors".to_owned(), lead.to_owned(), table)
 }
 
@@ -336,17 +336,15 @@ fn share_of(parts: &[PartShare], object: &str) -> Option<Share> {
 }
 
 fn quantities_from_simulator() -> Titled {
-    let mut table = Table::new(vec![
-        Column::text("what"),
-        Column::text("where it comes from"),
-        Column::text("measured with an error"),
-    ]);
+    let mut table =
+        Table::new(vec![Column::text("quantity"), Column::text("source"), Column::text("measured with an error")]);
     for row in known_from_simulator() {
         table = table.row([row.what, row.source, row.error].map(Cell::text).into());
     }
     Titled {
         title: "Quantities that the robot gets from the simulator".to_owned(),
-        lead: "All quantities that are exact for the simulated robot and would have to be measured for a real one."
+        lead: "Quantities that the simulated robot knows exactly and that would have to be measured for a real \
+               one."
             .to_owned(),
         table,
     }
@@ -468,7 +466,7 @@ mod tests {
         let text = markdown(&summary(2), Vec::new(), &[], "");
         let row = "| hand-eye wrong by 2 mm and 0.5° | C | 18 of 20 | 90.0 (69.9 to 97.2) | 15 of 20 | 3 of 20 |";
         assert!(text.contains(row), "{text}");
-        assert!(text.contains("camera intrinsics") && text.contains("height of the marks over the table"), "{text}");
+        assert!(text.contains("camera intrinsics") && text.contains("height of the marks above the table"), "{text}");
         assert!(text.contains("**Not complete: 2 units"), "{text}");
     }
 }

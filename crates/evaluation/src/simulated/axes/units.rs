@@ -1,4 +1,4 @@
-//! The work units of the axes: their dependencies and files. `work.rs` runs them.
+//! The work units of the axes, with their dependencies and files. `work.rs` runs them.
 
 use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
@@ -13,17 +13,17 @@ use crate::simulated::records::AttemptRecord;
 use crate::simulated::schedule::Task;
 use crate::simulated::store::Store;
 
-/// The models that grasp under errors: the paper's best, and the one without a network.
+/// The models for grasps under errors: the paper's best, and the one without a network.
 pub const GRASPING_MODELS: [ModelKind; 2] = [ModelKind::S, ModelKind::C];
 
-/// A piece of work that is stored or lost as a whole.
+/// A piece of work that is stored completely or not at all.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.
     Teach(Cell<'a>, Marks),
-    /// All models search a part's pictures of an axis: each picture is rendered once.
+    /// All models search a part's pictures of an axis; each picture is rendered once.
     Pictures(&'a ObjectSpec, Axis),
-    /// A model grasps a part under an error; stored attempt by attempt.
+    /// A model grasps a part under an error; each attempt is stored on its own.
     Grasps(Cell<'a>, &'a ObjectSpec, GraspCondition),
 }
 
@@ -33,12 +33,12 @@ pub struct AxesEvaluation<'a> {
     pub objects: &'a [ObjectSpec],
     /// Axes of pictures, and errors in grasps.
     pub selection: &'a Selection,
-    /// Network, training and augmentation, as named in the store's settings.
+    /// Network, training and augmentation, as named in the settings of the store.
     pub preset: Preset,
     pub store: &'a Store,
     /// Number of pictures of each part and axis.
     pub axis_views: u32,
-    /// Number of edge points that model S compares at each pose of its search, if not as taught.
+    /// Number of edge points that model S compares at each pose of its search; `None` for the taught number.
     pub search_points: Option<u32>,
     /// Number of parallel units.
     pub jobs: usize,
@@ -70,7 +70,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// A model's detections in a part's pictures of an axis, if available.
+    /// A model's stored detections in a part's pictures of an axis.
     pub fn axis_record(&self, cell: Cell, axis: Axis) -> Result<Option<AxisRecord>> {
         self.store.read_made_with(&axis_file(cell, axis), &self.axis_settings())
     }
@@ -83,17 +83,17 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// Whether attempts equal those of the paper's protocol: then they are shared.
+    /// Whether the attempts equal those of the paper's protocol, and are therefore the same.
     pub(super) fn is_in_protocol(&self, condition: GraspCondition) -> bool {
         condition == GraspCondition::NoError && self.search_points.is_none()
     }
 
-    /// The requested models that grasp under errors.
+    /// The requested models for grasps under errors.
     pub fn grasping_models(&self) -> impl Iterator<Item = ModelKind> {
         GRASPING_MODELS.into_iter().filter(|model| self.models.contains(model))
     }
 
-    /// The remaining units, part by part, so that an interrupted run has results of complete parts.
+    /// The remaining units, part by part, so that an interrupted run has results for complete parts.
     pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let mut tasks = Vec::new();
         for object in self.objects {
@@ -111,11 +111,11 @@ impl AxesEvaluation<'_> {
     }
 }
 
-/// The tasks of one part, while they are listed.
+/// The tasks of one part, while the list is made.
 struct TaskList<'e, 't> {
     evaluation: &'e AxesEvaluation<'e>,
     object: &'e ObjectSpec,
-    /// Networks to be taught, each with the index of its task.
+    /// Networks to teach, each with the index of its task.
     teachings: Vec<(ModelKind, Marks, usize)>,
     tasks: &'t mut Vec<Task<Unit<'e>>>,
 }
@@ -125,7 +125,7 @@ impl<'e> TaskList<'e, '_> {
         Cell { model, object: &self.object.name }
     }
 
-    /// Adds an axis' pictures, if a model has not been run on them.
+    /// Adds the pictures of an axis, unless all models have been run on them.
     fn add_pictures(&mut self, axis: Axis) -> Result<()> {
         let mut after = Vec::new();
         let mut is_missing = false;
@@ -143,7 +143,7 @@ impl<'e> TaskList<'e, '_> {
         Ok(())
     }
 
-    /// Adds the missing attempts.
+    /// Adds missing attempts.
     fn add_grasps(&mut self, model: ModelKind, condition: GraspCondition) -> Result<()> {
         let (cell, marks) = (self.cell(model), marks_of(condition));
         let wanted = self.evaluation.store.settings().attempts as usize;
@@ -155,7 +155,7 @@ impl<'e> TaskList<'e, '_> {
         Ok(())
     }
 
-    /// The task that teaches a cell's network, added if necessary; `None` if the network exists.
+    /// The task that teaches the network of a cell, added if necessary; `None` if the network exists.
     fn teaching_of(&mut self, cell: Cell<'e>, marks: Marks) -> Result<Option<usize>> {
         if cell.teaching_from(marks, self.evaluation.store)?.is_some() {
             return Ok(None);
@@ -193,7 +193,7 @@ pub(super) fn grasps_file(cell: Cell, condition: GraspCondition) -> String {
     format!("axes/{cell}.attempts-{}.json", condition.name())
 }
 
-/// The marks that a model is taught from for attempts under an error.
+/// The marks from which a model is taught for attempts under an error.
 pub(super) fn marks_of(condition: GraspCondition) -> Marks {
     if condition == GraspCondition::Marks { Marks::Jittered } else { Marks::Shipped }
 }
@@ -253,7 +253,7 @@ mod tests {
             search_points: None,
             jobs: 1,
         };
-        // B uses C's network; B does not grasp under errors; jittered marks have their own teaching.
+        // B uses C's network; B does not grasp under errors; jittered marks need their own teaching.
         assert_eq!(
             listed(&evaluation)[..6],
             [
@@ -267,7 +267,7 @@ mod tests {
         );
         assert_eq!(listed(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
 
-        // The protocol's attempts are the control's, and a part whose teaching failed needs no more work.
+        // The control is the attempts of the protocol, and a part whose teaching failed needs no further work.
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
         let done = AttemptsRecord::new(vec![attempt(1), attempt(2)]);
         store.write("cells/C-pendulum.attempts-verified.json", &done).unwrap();
@@ -301,7 +301,7 @@ mod tests {
         };
         assert_eq!(found(paper, ModelKind::B), (Share { count: 1, of: 2 }, 1));
         assert_eq!(found(paper, ModelKind::C), (Share { count: 2, of: 2 }, 0));
-        // Without a model every part counts as missed, and every attempt as failed.
+        // Without a model, every part counts as missed and every attempt as failed.
         assert_eq!(found(held_out, ModelKind::C), (Share { count: 0, of: 2 }, 0));
         assert_eq!(held_out.grasps[1].failures_by_step[AttemptRecord::TEACH], 2);
         assert_eq!(paper.grasps[0].held, Share { count: 0, of: 2 });

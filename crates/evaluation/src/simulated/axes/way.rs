@@ -1,4 +1,4 @@
-//! The two ways of measuring a model.
+//! The two ways in which a model is measured.
 
 use sdg_grasp::ModelKind;
 use serde::Serialize;
@@ -13,7 +13,7 @@ pub enum Way {
 }
 
 impl Way {
-    /// Both, in the order of the tables.
+    /// Both ways, in the order of the tables.
     pub const ALL: [Self; 2] = [Self::WithCheck, Self::NetworkAlone];
 
     /// The name in tables.
@@ -24,7 +24,7 @@ impl Way {
         }
     }
 
-    /// Whether a model can be measured in this way: a model without a network only has the check.
+    /// Whether a model has this way: a model without a network has only the check.
     pub fn is_of(self, model: ModelKind) -> bool {
         self == Self::WithCheck || model.has_network()
     }

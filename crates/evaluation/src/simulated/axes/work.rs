@@ -25,24 +25,25 @@ use crate::simulated::one_unit::{NO_MODEL, do_unit};
 use crate::simulated::schedule::run_all;
 use crate::simulated::teaching::Teaching;
 
-/// Maximum number of pictures of a stratum that are tried.
+/// Maximum number of pictures that are tried for a stratum.
 const MAX_DRAWINGS: u64 = 8;
 
-/// Result of a run.
+/// The result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunEnd {
     /// Number of units that are not in the store.
     pub remaining: usize,
-    /// The errors of the failed units among them.
+    /// The errors of failed units.
     pub failures: Vec<String>,
 }
 
 impl AxesEvaluation<'_> {
-    /// Runs the remaining units until `is_interrupted` is true; finished units are kept. A failed unit does not end the
-    /// others, so that hours of work do not depend on one part: its error is printed, and it is tried again next time.
+    /// Runs the remaining units until `is_interrupted` returns true, and keeps finished units. A failed unit does not
+    /// end the others, so that hours of work do not depend on one part: its error is printed, and it is tried again in
+    /// the next run.
     ///
     /// # Errors
-    /// The store cannot be read. A teaching without a model is a result.
+    /// The store cannot be read. A teaching without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<RunEnd> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -72,7 +73,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// A cell's model as it is measured.
+    /// The model of a cell, as it is measured.
     fn model(&self, cell: Cell, marks: Marks) -> Result<Option<GraspModel>> {
         let model = cell.read_model(marks, self.store)?;
         Ok(match (model, self.search_points) {
@@ -144,7 +145,7 @@ impl AxesEvaluation<'_> {
             model: &model,
             object,
             attempts: settings.attempts,
-            // The scenes of the paper's protocol: only the error differs.
+            // The scenes are those of the paper's protocol, so that only the error differs.
             seed: part_seed(settings.seed, object),
             verification: Verification::ByShape,
             errors: errors_of(condition),
@@ -161,12 +162,12 @@ impl AxesEvaluation<'_> {
     }
 }
 
-/// The errors of a condition's attempts.
+/// The errors in the attempts of a condition.
 fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     let workcell =
         |errors: fn(u64) -> AttemptErrors| RehearsalErrors { of_workcell: Some(errors), ..RehearsalErrors::default() };
     match condition {
-        // The error of jittered marks is in the teaching.
+        // Jittered marks are an error of the teaching.
         GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::default(),
         GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::default() },
         GraspCondition::HandEye => workcell(AttemptErrors::hand_eye),
@@ -189,7 +190,7 @@ pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> R
         .with_context(|| format!("picture {number}, drawn {MAX_DRAWINGS} times"))
 }
 
-/// A model's detections in a picture, in both ways.
+/// A model's detections in a picture, with the check and without.
 fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) -> Result<AxisPicture> {
     let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
     let answer = |verification| -> Result<_> {

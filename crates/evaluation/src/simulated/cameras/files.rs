@@ -1,4 +1,4 @@
-//! Writes the results of the cameras to files in the evaluation's folder, and a few lines.
+//! Writes the results of the cameras to files in the evaluation's folder, and prints them in a few lines.
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +11,8 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl CamerasSummary {
-    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, and `command`
-    /// reproduces the results.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units; `command` reproduces
+    /// the results.
     ///
     /// # Errors
     /// Files cannot be written.
@@ -21,8 +21,8 @@ impl CamerasSummary {
         let facts = [
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
-            ("seconds of a worker on pictures", format!("{:.0}", self.seconds)),
-            ("side by side", format!("{jobs} units of work")),
+            ("worker seconds for pictures", format!("{:.0}", self.seconds)),
+            ("in parallel", format!("{jobs} units of work")),
             ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];

@@ -1,9 +1,9 @@
-//! Models taught in the plan view of one calibrated camera, tested on pictures of others: grasps in metres against the
-//! ground truth.
+//! Models that are taught in the plan view of one calibrated camera, and tested on pictures of other cameras: grasps in
+//! metres, compared with the ground truth.
 //!
 //! ```text
 //! shipped photo and its camera ─ plan view ─ teach ┐
-//! three other cameras ┐                            ├─ PlanViewDetector ─ error in mm and degrees, and the error that it expects
+//! three other cameras ┐                            ├─ PlanViewDetector ─ error in mm and degrees, and the predicted error
 //! the axes' pictures  ├─ picture and its camera ───┘
 //! parts of other sizes┘
 //! ```

@@ -1,8 +1,8 @@
-//! Records of the pictures of a set, as stored.
+//! Stored records of the pictures of a set.
 
 use serde::{Deserialize, Serialize};
 
-/// An accepted detection compared with the nearest instance of the part.
+/// An accepted detection, compared with the nearest instance of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricAnswer {
     pub score: f64,
@@ -10,26 +10,26 @@ pub struct MetricAnswer {
     pub error_mm: Option<f64>,
     /// Angle error, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// The detection's standard deviation of each coordinate, in millimetres.
+    /// Radius that contains the position with a probability of 68 % according to the detection, in millimetres.
     pub sigma_mm: f64,
-    /// The detection's standard deviation of the angle, in degrees.
+    /// Angle error that the detection does not exceed with a probability of 68 % by its own estimate, in degrees.
     pub sigma_deg: f64,
-    /// The instance that it found: within 10 mm and 10°, and not found by a better detection.
+    /// The instance that the detection found: within 10 mm and 10°, and not found by a better detection.
     pub found: Option<usize>,
 }
 
 /// A picture and a model's detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraPicture {
-    /// Index among the set's pictures.
+    /// Index among the pictures of the set.
     pub number: u64,
-    /// Height of the camera over the table, in metres.
+    /// Height of the camera above the table, in metres.
     pub height_m: f64,
-    /// Its tilt from vertical, in degrees.
+    /// Tilt of the camera from the vertical, in degrees.
     pub tilt_deg: f64,
     /// Number of instances in the picture.
     pub instances: usize,
-    /// Accepted detections, best first; if there is at most one instance, only the best.
+    /// Accepted detections, best first; only the best one if there is at most one instance.
     pub answers: Vec<MetricAnswer>,
 }
 

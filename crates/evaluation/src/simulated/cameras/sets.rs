@@ -1,4 +1,4 @@
-//! The sets of pictures: of other cameras, of the axes, and of parts of other sizes.
+//! The sets of pictures: other cameras, axes, and parts of other sizes.
 
 use anyhow::Result;
 use nalgebra::{Isometry3, Vector3};
@@ -8,17 +8,17 @@ use sdg_simulation::views::{Axis, OTHER_CAMERAS, OnTable, other_view};
 
 use crate::simulated::axes::draw;
 
-/// Sizes of parts that must be refused, in percent of the part's size.
+/// Sizes of parts that must be refused, in percent of the taught part's size.
 const OTHER_SIZES_PERCENT: [u32; 4] = [80, 90, 110, 125];
 
 /// A set of pictures with its own row in the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureSet {
-    /// Taken by one of [`OTHER_CAMERAS`].
+    /// Pictures of one of [`OTHER_CAMERAS`].
     Camera(usize),
-    /// Of the wrist camera, along an axis of difficulty.
+    /// Pictures of the wrist camera along an axis of difficulty.
     Axis(Axis),
-    /// Of all cameras in turn, with a part of another size in place of the part.
+    /// Pictures of all cameras, one after another, in which a part of another size replaces the part.
     OtherSizes,
 }
 
@@ -66,7 +66,7 @@ impl PictureSet {
 }
 
 impl Shown {
-    /// Height of the camera over the table in metres, and its tilt from vertical in degrees.
+    /// Height of the camera above the table, in metres, and its tilt from the vertical, in degrees.
     pub fn height_and_tilt(&self) -> (f64, f64) {
         let camera = self.view.camera.world_from_camera;
         let down = -(camera * Vector3::z()).z;

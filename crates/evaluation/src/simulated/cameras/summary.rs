@@ -1,4 +1,4 @@
-//! Detection rates and errors.
+//! Summary of detection rates and errors.
 
 use anyhow::Result;
 use sdg_geometry::percentile;
@@ -11,7 +11,7 @@ use super::units::CamerasEvaluation;
 use crate::simulated::cell::Cell;
 use crate::statistics::Share;
 
-/// Height of the marks over the table, in metres, above which a part's walls are visible from the side.
+/// Minimum height of the marks above the table, in metres, of a part whose walls are visible from the side.
 pub(super) const HIGH_M: f64 = 0.010;
 
 /// Errors of found instances.
@@ -19,29 +19,29 @@ pub(super) const HIGH_M: f64 = 0.010;
 pub struct ErrorFigures {
     /// Median position error in the marks' plane, in millimetres.
     pub median_mm: f64,
-    /// 95th percentile of the position error.
+    /// 95th percentile of the position errors, in millimetres.
     pub p95_mm: f64,
     /// Median angle error, in degrees, modulo the part's symmetry; without parts whose angle is not visible.
     pub median_deg: Option<f64>,
-    /// 95th percentile of the angle error.
+    /// 95th percentile of the angle errors, in degrees.
     pub p95_deg: Option<f64>,
-    /// Number of errors within the detection's 68 % radius.
+    /// Position errors within the radius that the detections give for 68 %.
     pub within_sigma_mm: Share,
-    /// Number of angle errors within the detection's sigma.
+    /// Angle errors within the detections' sigma.
     pub within_sigma_deg: Share,
 }
 
-/// Results of a model on a set of pictures, of all parts or of some.
+/// Results of a model on a set of pictures, for all parts or some of them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetFigures {
     pub model: ModelKind,
     pub set: &'static str,
     pub parts: String,
-    /// Instances found, of those in the pictures.
+    /// Instances found, of all in the pictures.
     pub found: Share,
-    /// Pictures without the part in which something was accepted, of all without it.
+    /// Pictures without the part in which a detection was accepted, of all without the part.
     pub accepted: Share,
-    /// Number of accepted detections that are not right.
+    /// Number of accepted detections that found no instance.
     pub wrong: usize,
     /// Errors of the found instances.
     pub errors: Option<ErrorFigures>,
@@ -50,11 +50,11 @@ pub struct SetFigures {
 /// All results.
 #[derive(Debug, Clone, Serialize)]
 pub struct CamerasSummary {
-    /// By model and set, over all parts.
+    /// Results of each model and set, over all parts.
     pub sets: Vec<SetFigures>,
-    /// The same, for low and high parts separately.
+    /// Results of each model and set, for low and high parts separately.
     pub by_height: Vec<SetFigures>,
-    /// The three cameras together, by part.
+    /// Results of each part, for the three cameras together.
     pub by_part: Vec<SetFigures>,
     /// Worker seconds for the pictures.
     pub seconds: f64,
@@ -76,7 +76,7 @@ impl CamerasSummary {
     /// Reads all results in the store.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub fn collect(evaluation: &CamerasEvaluation) -> Result<Self> {
         let mut shown = Vec::new();
         let mut seconds = 0.0;

@@ -1,4 +1,4 @@
-//! The results with calibrated cameras as tables and as a page.
+//! The results for calibrated cameras, as tables and as a page.
 
 use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 
@@ -21,7 +21,7 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
         },
         Titled {
             title: "By the part's height".into(),
-            lead: format!("Low parts have their marks at most {:.0} mm over the table.", 1e3 * HIGH_M),
+            lead: format!("The marks of low parts are at most {:.0} mm above the table.", 1e3 * HIGH_M),
             table: table(&summary.by_height, Some("parts")),
         },
         Titled {
@@ -32,7 +32,7 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
     ]
 }
 
-/// `of` is the heading of a column that names the parts of a row, if rows are not of all parts.
+/// Makes a table. `of` is the heading of a column that names the parts of a row; `None` if every row is of all parts.
 fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     let mut columns = vec![Column::text("model"), Column::text("pictures")];
     columns.extend(of.map(Column::text));
@@ -42,13 +42,13 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
         Column::number("median").unit("mm").group("place"),
         Column::number("95 %").unit("mm").group("place"),
         Column::text("within sigma").group("place"),
-        Column::number("median").unit("°").group("turn"),
-        Column::number("95 %").unit("°").group("turn"),
-        Column::text("within sigma").group("turn"),
+        Column::number("median").unit("°").group("angle"),
+        Column::number("95 %").unit("°").group("angle"),
+        Column::text("within sigma").group("angle"),
     ]);
     let mut table = Table::new(columns);
     for row in rows {
-        // Without a line break in the share.
+        // A line break inside the fraction is prevented.
         let whole = |share: crate::statistics::Share| share.to_string().replace(' ', "\u{a0}");
         let found = match row.found.of {
             0 => Cell::text(format!("accepted: {}", whole(row.accepted))),
@@ -76,7 +76,7 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     table
 }
 
-/// The tables as a document; `facts` are the settings for reproducing the numbers.
+/// The tables as a document; `facts` are the settings for reproducing the results.
 pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> String {
     document("Calibrated cameras", incomplete(summary.remaining), tables(summary), facts, command)
 }

@@ -1,4 +1,4 @@
-//! The work units, and their implementation.
+//! The work units of the cameras, and their implementation.
 
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ use crate::simulated::settings::TeachingSettings;
 use crate::simulated::store::Store;
 use crate::simulated::teaching::Teaching;
 
-/// A piece of work that is stored or lost as a whole.
+/// A piece of work that is stored completely or not at all.
 #[derive(Debug, Clone, Copy)]
 enum Unit<'a> {
     /// A network is taught on a part in the plan view.
@@ -35,7 +35,7 @@ pub struct CamerasEvaluation<'a> {
     pub models: &'a [ModelKind],
     pub objects: &'a [ObjectSpec],
     pub sets: &'a [PictureSet],
-    /// Network, training and augmentation, as named in the store's settings.
+    /// Network, training and augmentation, as named in the settings of the store.
     pub preset: Preset,
     pub store: &'a Store,
     /// Number of pictures of each part and set.
@@ -44,10 +44,10 @@ pub struct CamerasEvaluation<'a> {
     pub jobs: usize,
 }
 
-/// The settings on which the results of a set depend, besides set, model and part.
+/// The settings that determine the results of a set, besides set, model and part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct CameraSettings {
-    /// Version of rendering and scoring, raised when either changes.
+    /// Version of rendering and scoring; raised when either changes.
     cameras: u32,
     #[serde(flatten)]
     teaching: TeachingSettings,
@@ -58,7 +58,7 @@ impl CamerasEvaluation<'_> {
     /// Runs the remaining units until `is_interrupted` is true.
     ///
     /// # Errors
-    /// The first error of a unit; the store cannot be read. A teaching without a model is a result.
+    /// The first error of a unit; or the store cannot be read. A teaching without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<()> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -72,7 +72,7 @@ impl CamerasEvaluation<'_> {
         Ok(self.tasks()?.len())
     }
 
-    /// A model's detections in a part's pictures of a set, if available.
+    /// A model's stored detections in a part's pictures of a set.
     pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
         self.store.read_made_with(&file(cell, set), &self.settings())
     }

@@ -1,4 +1,4 @@
-//! Faults of units that prevent the tables: missing, running, failed, duplicate, or different from the receipt.
+//! Faults of units for which no tables can be made: missing, running, failed, duplicate, or different from the receipt.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use super::unit_list::ListedUnit;
 pub struct Collecting(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl Collecting {
-    /// Takes this right for the process; `None` if another process has it.
+    /// Takes the right for this process; `None` if another process has it.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -26,7 +26,7 @@ impl Collecting {
     }
 }
 
-/// One line for each unit that must not be counted; empty if the tables can be made.
+/// One line for each unit that cannot be counted; empty if the tables can be made.
 ///
 /// # Errors
 /// Records cannot be read.
@@ -50,7 +50,7 @@ pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<Strin
 
 fn why_missing(state: &UnitState) -> String {
     match (&state.running, state.failures.last()) {
-        (Some(running), _) if !state.is_abandoned => format!("still at work on {}", running.by),
+        (Some(running), _) if !state.is_abandoned => format!("still running on {}", running.by),
         (Some(running), _) => format!("missing: {} ended without a result", running.by),
         (None, Some(failure)) => format!(
             "missing: failed {} on {}: {}",
@@ -62,7 +62,7 @@ fn why_missing(state: &UnitState) -> String {
     }
 }
 
-/// The first difference between a unit's results and its receipt, these settings or this program.
+/// The first difference between a unit's results and its receipt, these settings, or this program.
 fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Result<Option<String>> {
     if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
         return Ok(Some(format!("stale: done with other settings ({difference})")));

@@ -1,4 +1,4 @@
-//! Runs one unit in a folder that is shared with other processes.
+//! Runs one unit in a folder that several processes use.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -20,23 +20,23 @@ use super::unit_list::{ListedUnit, Work};
 use super::worker::Worker;
 use crate::error::EvaluationError;
 
-/// Outcome of a unit.
+/// The outcome of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
-    /// Done, with its result in words.
+    /// The unit is done; contains the result in words.
     Done(String),
-    /// It was done before.
+    /// The unit was done before.
     Already(Box<Receipt>),
-    /// By Ctrl-C.
+    /// The unit was interrupted by Ctrl-C.
     Interrupted,
 }
 
 impl Evaluation<'_> {
     /// Runs a unit with this number of threads, unless it is done already, and writes a receipt or the reason of its
-    /// failure. If another process is running it, this is reported, and its end is waited for.
+    /// failure. If another process is running the unit, this is reported, and the function waits for its end.
     ///
     /// # Errors
-    /// The unit's own errors; a dependency is missing; the unit was done with other settings.
+    /// The errors of the unit; a dependency is missing; or the unit was done with other settings.
     pub fn do_listed(
         &self,
         unit: &ListedUnit,
@@ -50,7 +50,7 @@ impl Evaluation<'_> {
         let mut wait = || {
             if !is_told {
                 is_told = true;
-                told(&format!("{name}: at work elsewhere{}; waiting for its end", holder_text(&folder)));
+                told(&format!("{name}: running in another process{}; waiting for its end", holder_text(&folder)));
             }
             !is_interrupted()
         };
@@ -91,13 +91,13 @@ impl Evaluation<'_> {
                 let failure = Failure { unit: name.clone(), by, started_secs, seconds, why: one_line(&error) };
                 Err(match folder.fail(&failure) {
                     Ok(()) => error.context(name.clone()),
-                    Err(also) => anyhow!("{name}: {}; nor can that be recorded: {}", failure.why, one_line(&also)),
+                    Err(also) => anyhow!("{name}: {}; and this cannot be recorded: {}", failure.why, one_line(&also)),
                 })
             }
         }
     }
 
-    /// The settings on which a unit's files depend.
+    /// The settings that determine a unit's files.
     pub(super) fn settings_of(&self, unit: &ListedUnit) -> Result<Value> {
         let settings = self.store.settings();
         Ok(match unit.work {
@@ -106,14 +106,14 @@ impl Evaluation<'_> {
         })
     }
 
-    /// A unit without its dependencies cannot run.
+    /// Checks that the units on which a unit depends are done.
     fn check_after(&self, unit: &ListedUnit) -> Result<()> {
         let folder = self.store.folder();
         for before in &unit.after {
             if UnitFolder::of(folder, before).read()?.receipts.is_empty() {
                 bail!(
-                    "expected {before} to be done before, found no receipt of it in {}; if it is done, this folder is not the one \
-                     where it was done: is it shared between the machines?",
+                    "expected {before} to be done before, found no receipt of it in {}; if it was done, it was done \
+                     in another folder: check that all machines use the same one",
                     folder.display()
                 );
             }
@@ -143,7 +143,7 @@ impl Evaluation<'_> {
         Ok(summary.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The files written by a unit, with their hashes.
+    /// The files written by a unit and their hashes.
     fn written_by(&self, unit: &ListedUnit) -> Result<BTreeMap<String, String>> {
         let mut written = BTreeMap::new();
         for file in &unit.files {

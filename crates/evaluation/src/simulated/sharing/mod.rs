@@ -1,22 +1,22 @@
-//! An evaluation's units done by many processes, on all machines that see one folder: by Slurm's job arrays, or by
-//! hand.
+//! An evaluation whose units are done by many processes on machines with a common folder: in Slurm's job arrays, or
+//! started by hand.
 //!
 //! ```text
 //! all_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)
 //!                        ├─ --watch DIR    ─ Watch: done, running, failed, waiting, time left
-//!                        └─ --collect      ─ faults, or the tables of the ordinary run
-//! DIR/plans/HASH.json            which units there are, for --watch
+//!                        └─ --collect      ─ faults, or the tables of an ordinary run
+//! DIR/plans/HASH.json            all units, for --watch
 //! DIR/units/NAME/lock            held by the process that does the unit
 //! DIR/units/NAME/running.json    that process
-//! DIR/units/NAME/done-*.json     a receipt: by whom, with which settings, and the SHA-256 of each file that the unit wrote
-//! DIR/units/NAME/failed-*.json   why it failed, by whom
+//! DIR/units/NAME/done-*.json     a receipt: the process, its settings, and the SHA-256 of each file that the unit wrote
+//! DIR/units/NAME/failed-*.json   the process and its error
 //! ```
 //!
 //! A **unit** has a constant name and its own folder, so that a process reads and writes the same few files for any
-//! number of units. Records contain the SHA-256 of the program besides the settings of the ordinary run; the shipped
-//! demonstrations are compiled into the program, so its hash covers them too.
+//! number of units. Records contain the SHA-256 of the program in addition to the settings of the ordinary run. The
+//! shipped demonstrations are compiled into the program, so its hash includes them.
 //!
-//! The assignment of units to processes is left to Slurm.
+//! Slurm assigns the units to processes.
 
 mod checking;
 mod doing;

@@ -1,11 +1,11 @@
-//! Known names similar to a misspelt one.
+//! Finds known names that are similar to a misspelt one.
 
 use strsim::levenshtein;
 
-/// Maximum number of names.
+/// Maximum number of returned names.
 const MAX_NAMES: usize = 3;
 
-/// The names in `known` that are most similar to `name`, nearest first.
+/// The names in `known` that are most similar to `name`, the nearest first.
 pub fn near_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let mut near: Vec<(usize, &str)> = known.into_iter().map(|known| (levenshtein(name, known), known)).collect();
     near.sort_by_key(|(edits, _)| *edits);

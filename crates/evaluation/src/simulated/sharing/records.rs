@@ -1,4 +1,4 @@
-//! The records of a process in a unit's folder.
+//! Records that a process writes in a unit's folder.
 
 use std::collections::BTreeMap;
 
@@ -7,39 +7,39 @@ use serde_json::Value;
 
 use super::worker::Worker;
 
-/// A unit is running.
+/// The record of a running unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Running {
     pub by: Worker,
-    /// Seconds since 1970.
+    /// Time of the start, in seconds since 1970.
     pub started_secs: u64,
 }
 
-/// A unit is done.
+/// The record of a finished unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Receipt {
     pub unit: String,
     pub by: Worker,
-    /// Seconds since 1970.
+    /// Time of the start, in seconds since 1970.
     pub started_secs: u64,
-    /// Duration.
+    /// Duration, in seconds.
     pub seconds: f64,
     /// The result in words.
     pub summary: String,
-    /// The settings on which its files depend, and the program's SHA-256.
+    /// The settings that determine the unit's files, and the program's SHA-256.
     pub settings: Value,
-    /// The files that it wrote, with paths relative to the evaluation's folder, and their SHA-256.
+    /// The SHA-256 of each file that the unit wrote, by its path relative to the evaluation's folder.
     pub files: BTreeMap<String, String>,
 }
 
-/// A unit has failed.
+/// The record of a failed unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
     pub unit: String,
     pub by: Worker,
-    /// Seconds since 1970.
+    /// Time of the start, in seconds since 1970.
     pub started_secs: u64,
     pub seconds: f64,
-    /// The reason, on one line.
+    /// The reason of the failure, on one line.
     pub why: String,
 }

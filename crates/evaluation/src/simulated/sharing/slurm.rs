@@ -1,8 +1,8 @@
 //! A script that submits an evaluation's units to Slurm: three consecutive job arrays.
 //!
-//! Teachings first; pictures and grasps when the teachings have ended; speed, each unit alone on a node, when all
-//! others have ended. An array waits for the end of the previous one, not for its success: a failed teaching does not
-//! block the units of other parts, and the units of its own part report what is missing.
+//! Teachings are first; pictures and grasps start when the teachings have ended; speed is measured at the end, each
+//! unit alone on a node. An array waits for the end of the previous one, not for its success: a failed teaching does
+//! not block the units of other parts, and the units of its own part report that the model is missing.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -12,24 +12,24 @@ use super::worker::{Worker, unix_secs};
 
 /// The script of one task.
 const UNIT_JOB: &str = include_str!("unit_job.sh");
-/// Maximum number of tasks of an array: Slurm's default for the largest index is 1000.
+/// Maximum number of tasks in an array: Slurm's default limit of the index is 1000.
 const MAX_TASKS: usize = 1000;
 
-/// The resources that each task requests from Slurm, and its command.
+/// The command of each task, and the resources that it requests from Slurm.
 #[derive(Debug, Clone)]
 pub struct SlurmJob<'a> {
-    /// The program and its arguments, except --out and --unit.
+    /// The program and its arguments, without --out and --unit.
     pub command: &'a [String],
     /// Absolute path of the evaluation's folder.
     pub folder: &'a Path,
     pub cores: u32,
     pub memory_mb: u32,
     pub limit_mins: u32,
-    /// Additional arguments of sbatch.
+    /// Additional arguments for sbatch.
     pub sbatch: &'a [String],
 }
 
-/// The script.
+/// The script that submits the units.
 pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
     let folder = quoted(&job.folder.display().to_string());
     let host = Worker::this().host;
@@ -92,7 +92,7 @@ pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
     script
 }
 
-/// A word quoted for the shell.
+/// Quotes a word for the shell.
 fn quoted(word: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,=:+%".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {
@@ -101,7 +101,7 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// The number of cores allocated by Slurm, or of the machine.
+/// The number of cores that Slurm allocated, or else the machine's.
 pub fn cores() -> usize {
     let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
     given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))

@@ -1,4 +1,4 @@
-//! The folder of one unit: its processes and results.
+//! The folder of one unit, with records of its processes and results.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,26 +12,26 @@ use serde::de::DeserializeOwned;
 use super::records::{Failure, Receipt, Running};
 use super::worker::{Worker, unix_secs};
 
-/// Maximum size of a unit's record.
+/// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
-/// Interval of attempts to take a lock that another process holds.
+/// Interval between attempts to take a lock that another process holds.
 const LOCK_WAIT: Duration = Duration::from_millis(500);
 const RUNNING: &str = "running.json";
 
-/// The folder with a unit's records.
+/// The folder with the records of a unit.
 #[derive(Debug)]
 pub struct UnitFolder(PathBuf);
 
 /// The state of a unit.
 #[derive(Debug, Default)]
 pub struct UnitState {
-    /// More than one if two processes did the same unit.
+    /// Receipts; more than one if two processes did the same unit.
     pub receipts: Vec<Receipt>,
-    /// Oldest first.
+    /// Failures, the oldest first.
     pub failures: Vec<Failure>,
-    /// The process that began it last and has not ended it.
+    /// The process that last began the unit and has not ended it.
     pub running: Option<Running>,
-    /// Whether that process disappeared without a record.
+    /// Whether that process no longer exists, although it left no record of an end.
     pub is_abandoned: bool,
 }
 
@@ -40,14 +40,14 @@ pub struct UnitState {
 pub(super) struct Held(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl UnitFolder {
-    /// The folder of a unit in an evaluation's folder; it need not exist.
+    /// The folder of a unit in an evaluation's folder, whether or not it exists.
     pub fn of(evaluation: &Path, unit: &str) -> Self {
         Self(evaluation.join("units").join(unit))
     }
 
-    /// Takes the unit for this process once its holder has ended; `wait` is called repeatedly, and may return `false`
-    /// to give up: the result is then `None`. A file system without locks grants every request: duplicates are then
-    /// detected by two receipts.
+    /// Takes the unit for this process once its holder has ended. `wait` is called repeatedly, and may return `false`
+    /// to stop waiting; the result is then `None`. A file system without locks grants every request: duplicates are
+    /// then detected by two receipts.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -62,7 +62,7 @@ impl UnitFolder {
         }
     }
 
-    /// Reads the state.
+    /// Reads the state of the unit.
     ///
     /// # Errors
     /// Records cannot be read or are damaged.
@@ -75,7 +75,7 @@ impl UnitFolder {
             } else if name.starts_with("failed-") {
                 state.failures.push(read_record(&path)?);
             } else if name == RUNNING {
-                // It may end between the two reads.
+                // The process may end between the two reads.
                 state.running = path
                     .exists()
                     .then(|| read_record(&path))
@@ -107,7 +107,7 @@ impl UnitFolder {
         self.end()
     }
 
-    /// Revokes [`Self::begin`].
+    /// Removes the record of [`Self::begin`].
     pub(super) fn end(&self) -> Result<()> {
         let path = self.0.join(RUNNING);
         fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))
@@ -157,7 +157,7 @@ mod tests {
         let state = unit.read().unwrap();
         assert!(state.running.unwrap().by == worker() && !state.is_abandoned);
         drop(held);
-        // The process disappeared without a record.
+        // The process ended without a record.
         assert!(unit.read().unwrap().is_abandoned);
         assert!(unit.hold(&mut || false).unwrap().is_some());
     }

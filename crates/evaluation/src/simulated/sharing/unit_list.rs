@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::super::cell::{Cell, Marks, attempts_of};
 use super::super::units::Unit;
 
-/// Maximum size of a plan: larger than one of a hundred thousand units.
+/// Maximum size of a plan, larger than a plan of a hundred thousand units.
 const MAX_LIST_BYTES: u64 = 64 << 20;
 
-/// The kind of work of a unit: the first word of its name.
+/// The kind of a unit's work, which is the first word of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnitKind {
@@ -29,7 +29,7 @@ impl UnitKind {
     /// All kinds, in the order of the plan.
     pub const ALL: [Self; 4] = [Self::Teach, Self::Look, Self::Grasp, Self::Time];
 
-    /// The first word of its units' names.
+    /// The first word of the names of these units.
     pub fn name(self) -> &'static str {
         match self {
             Self::Teach => "teach",
@@ -39,12 +39,12 @@ impl UnitKind {
         }
     }
 
-    /// Whether its units render pictures: all but teachings do, which use shipped photos.
+    /// Whether units of this kind render pictures: all except teachings, which use shipped photos.
     pub fn is_simulated(self) -> bool {
         self != Self::Teach
     }
 
-    /// The kind that a unit's name begins with.
+    /// The kind of a unit, from the first word of its name.
     pub fn of(unit: &str) -> Option<Self> {
         let first = unit.split('-').next()?;
         Self::ALL.into_iter().find(|kind| kind.name() == first)
@@ -61,23 +61,23 @@ impl fmt::Display for UnitKind {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Work<'a> {
     Unit(Unit<'a>),
-    /// The speed of all models on a part.
+    /// Measuring the speed of all models on a part.
     Time(&'a ObjectSpec),
 }
 
-/// A unit of work with its name.
+/// A unit of work and its name.
 #[derive(Debug, Clone)]
 pub struct ListedUnit<'a> {
     pub name: String,
-    /// Names of the units that must be done before.
+    /// Names of the units that must be done before this one.
     pub after: Vec<String>,
-    /// The files that it may write, relative to the evaluation's folder. For a part without a model, some are not
+    /// The files that the unit may write, relative to the evaluation's folder. For a part without a model, some are not
     /// written.
     pub(super) files: Vec<String>,
     pub(super) work: Work<'a>,
 }
 
-/// All units: teachings, pictures, grasps, grasps without the check, speed. Each follows its dependencies.
+/// All units: teachings, pictures, grasps, grasps without the check, speed. Each unit comes after its dependencies.
 pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified: bool) -> Vec<ListedUnit<'a>> {
     let mut networks: Vec<ModelKind> = Vec::new();
     for network in models.iter().map(|model| model.taught_as()) {
@@ -135,7 +135,7 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
     units
 }
 
-/// A plan stored in a folder, so that `--watch` does not need the arguments.
+/// A plan stored in a folder, so that `--watch` needs no other arguments.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnitList {
     pub units: Vec<SavedUnit>,
@@ -154,7 +154,7 @@ impl UnitList {
         Self { units: units.iter().map(saved).collect() }
     }
 
-    /// Stores the plan in an evaluation's folder, unless it exists.
+    /// Stores the plan in an evaluation's folder, unless it is there already.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -162,7 +162,7 @@ impl UnitList {
         let mut bytes = serde_json::to_vec(self)?;
         bytes.push(b'\n');
         let plans = folder.join("plans");
-        // One file per content, whoever writes it, and however often.
+        // The name depends only on the content, so that each plan is stored once.
         let path = plans.join(format!("{:016x}.json", fnv1a(&bytes)));
         if path.exists() {
             return Ok(());
@@ -171,7 +171,7 @@ impl UnitList {
         Ok(write_atomically(&path, &bytes)?)
     }
 
-    /// All units of all plans of a folder; empty without a plan.
+    /// All units of all plans in a folder; empty without a plan.
     ///
     /// # Errors
     /// Plans cannot be read.
@@ -191,7 +191,7 @@ impl UnitList {
     }
 }
 
-/// Distinguishes contents; not cryptographic (FNV-1a, 64 bits).
+/// A hash that distinguishes contents; not cryptographic (FNV-1a, 64 bits).
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
@@ -228,7 +228,7 @@ mod tests {
         ] {
             assert!(listed.iter().any(|unit| unit == expected), "{expected} of {listed:?}");
         }
-        // S has no network that could work without the check.
+        // S has no network that could detect without the check.
         assert!(!listed.iter().any(|unit| unit.starts_with("grasp-S-pendulum-unverified")));
         assert_eq!(units.len(), 4 + 2 + 6 + 4 + 2);
         for (i, unit) in units.iter().enumerate() {

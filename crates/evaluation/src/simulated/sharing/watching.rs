@@ -11,12 +11,12 @@ use super::unit_folder::UnitFolder;
 use super::unit_list::{SavedUnit, UnitKind, UnitList};
 use super::worker::{Worker, unix_secs};
 
-/// Number of failures after which a unit is not tried again: Slurm requeues a job once.
+/// Number of failures after which a unit is not tried again, since Slurm requeues a job once.
 const MAX_TRIES: usize = 2;
-/// Maximum number of listed running units, and of listed failed units.
+/// Maximum number of running units, and of failed units, in the list.
 const MAX_LISTED: usize = 12;
 
-/// Watches a folder; finished units are not read again.
+/// Watches a folder. Finished units are not read again.
 #[derive(Debug)]
 pub struct Watch {
     folder: PathBuf,
@@ -31,13 +31,13 @@ pub struct Progress {
     pub done: usize,
     pub running: Vec<RunningUnit>,
     pub failed: Vec<FailedUnit>,
-    /// Number of units neither done nor begun.
+    /// Number of units that are neither done nor begun.
     pub waiting: usize,
-    /// Estimated seconds left with the current number of running units; `None` before the first is done.
+    /// Estimated remaining seconds with the current number of running units; `None` before the first unit is done.
     pub seconds_left: Option<f64>,
-    /// Number of finished and of all units of each kind.
+    /// Number of finished units and of all units of each kind.
     pub kinds: Vec<KindProgress>,
-    /// Whether nothing will change any more: all units are done, have failed twice, or wait for a failed one.
+    /// Whether the progress is final: all units are done, have failed twice, or wait for a failed unit.
     pub is_settled: bool,
 }
 
@@ -52,7 +52,7 @@ pub struct KindProgress {
 pub struct RunningUnit {
     pub unit: String,
     pub by: Worker,
-    /// Time since its start.
+    /// Seconds since the start.
     pub seconds: u64,
 }
 
@@ -131,8 +131,8 @@ impl Watch {
         })
     }
 
-    /// Estimates the remaining time from the durations of finished units of the same kind, or of all units if there are
-    /// none.
+    /// Estimates the remaining seconds from the durations of finished units of the same kind, or of all finished units
+    /// if there are none of that kind.
     fn seconds_left(&self, plan: &UnitList, running: usize) -> Option<f64> {
         let mean = |kind: Option<UnitKind>| {
             let of_kind = self.done.iter().filter(|(name, _)| kind.is_none() || UnitKind::of(name) == kind);
@@ -148,7 +148,7 @@ impl Watch {
 }
 
 impl fmt::Display for Progress {
-    /// A screen; its first line is complete by itself.
+    /// The text of a screen. Its first line is complete by itself.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -184,7 +184,7 @@ impl fmt::Display for Progress {
     }
 }
 
-/// A line for units that are not listed.
+/// A line for the units that are not listed.
 fn more(f: &mut fmt::Formatter<'_>, listed: usize) -> fmt::Result {
     if listed > MAX_LISTED { writeln!(f, "  and {} more", listed - MAX_LISTED) } else { Ok(()) }
 }

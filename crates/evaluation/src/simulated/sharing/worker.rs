@@ -1,4 +1,4 @@
-//! The process that runs a unit: machine, process, Slurm job; and its program.
+//! The process that runs a unit: machine, process and Slurm job; and the hash of its program.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 /// A process that runs units.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Worker {
-    /// Slurm's name of the node, or the machine's name.
+    /// Slurm's name of the node, or else the machine's name.
     pub host: String,
     pub pid: u32,
-    /// Slurm's job, if it is one.
+    /// The Slurm job, if the process is part of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
 }
@@ -28,7 +28,7 @@ impl Worker {
         Self { host: host.unwrap_or_else(|| "unknown".to_owned()), pid: std::process::id(), job: set("SLURM_JOB_ID") }
     }
 
-    /// A unique part of a file name for this process.
+    /// A part of a file name that is unique for this process.
     pub(super) fn file_name_part(&self, started_secs: u64) -> String {
         let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '.';
         let host: String = self.host.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
@@ -54,9 +54,9 @@ pub(super) fn unix_secs() -> u64 {
 /// The SHA-256 of the running program.
 ///
 /// # Errors
-/// The program's file cannot be read.
+/// The program file cannot be read.
 pub fn own_sha256() -> Result<String> {
-    // The running file, even if another one has replaced it by name since.
+    // The running file, even if another file of this name has replaced it.
     let running = PathBuf::from("/proc/self/exe");
     let path = if running.exists() { running } else { std::env::current_exe().context("the program's own path")? };
     sha256_of(&path).with_context(|| format!("{}: the program's own file", path.display()))

@@ -1,16 +1,16 @@
-//! Common parts of all documents and pages: whether they are complete, and how to reproduce the numbers.
+//! Common sections of all documents and pages: whether they are complete, and how to reproduce the results.
 
 use sdg_report::Section;
 
 use super::titled::Titled;
 
-/// A notice to precede the numbers, if units of work remain.
+/// A notice that precedes the tables, if units of work remain.
 pub fn incomplete(remaining: usize) -> Option<String> {
     (remaining > 0)
-        .then(|| format!("Not complete: {remaining} units of work are still to do. The same command continues."))
+        .then(|| format!("Not complete: {remaining} units of work are left. Run the same command again to continue."))
 }
 
-/// Tables as a document in Markdown; `facts` and `command` are for reproducing the numbers.
+/// Tables as a document in Markdown; `facts` and `command` are for reproducing the results.
 pub fn document(
     title: &str,
     notice: Option<String>,
@@ -32,7 +32,7 @@ pub fn document(
     text + &format!("\n```\n{command}\n```\n")
 }
 
-/// The same at the end of a page.
+/// The settings and the command as a section at the end of a page.
 pub fn this_run(facts: &[(&str, String)], command: &str) -> Section {
     Section::new("This run")
         .lead("Settings for reproducing the numbers.")

@@ -1,4 +1,4 @@
-//! Attempts: the number of held parts, and the steps at which the others ended.
+//! Tables of attempts: the number of held parts, and the steps at which other attempts ended.
 
 use sdg_report::{Cell, Column, Table, Tone};
 
@@ -8,7 +8,7 @@ use crate::simulated::records::AttemptRecord;
 use crate::simulated::summary::{Figures, Summary};
 use crate::statistics::Share;
 
-/// The paper's Table II: success.
+/// The success, as in the paper's Table II.
 pub(super) fn success(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),

@@ -1,4 +1,4 @@
-//! Pictures: errors of detections, and false alarms.
+//! Tables of pictures: errors of detections, and false alarms.
 
 use sdg_report::{Cell, Column, Table, Tone};
 
@@ -14,8 +14,8 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
         Column::number("right").unit("%"),
         Column::number("median").unit("mm").group("place"),
         Column::number("90 %").unit("mm").group("place"),
-        Column::number("median").unit("°").group("turn"),
-        Column::number("90 %").unit("°").group("turn"),
+        Column::number("median").unit("°").group("angle"),
+        Column::number("90 %").unit("°").group("angle"),
         Column::number("images a second"),
     ]);
     for model in &summary.models {
@@ -33,7 +33,7 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
         }
     }
     Titled {
-        title: "Detection against the truth".to_owned(),
+        title: "Detection errors".to_owned(),
         lead: format!(
             "{} unseen pictures of each part from the look-out pose. Right: found within {RIGHT_MM:.0} mm and \
              {RIGHT_DEGREES:.0}°. Errors are of all detections, right or wrong, modulo the part's symmetry. \

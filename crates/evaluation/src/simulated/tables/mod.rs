@@ -1,4 +1,4 @@
-//! The paper's two tables for this project, and more detailed ones; as Markdown here, with the same rows on the page.
+//! The paper's two tables for this project, and more detailed ones: here as Markdown, with the same rows on the page.
 
 mod document;
 mod grasping;
@@ -18,7 +18,7 @@ pub(super) use titled::{number, share};
 
 pub(super) use document::{document, incomplete, this_run};
 
-/// All tables, most important first.
+/// All tables, the most important first.
 pub fn tables(summary: &Summary) -> Vec<Titled> {
     let mut tables = vec![
         grasping::success(summary),
@@ -41,18 +41,18 @@ pub fn tables(summary: &Summary) -> Vec<Titled> {
     tables
 }
 
-/// The tables as a separate document, group by group; `facts` are the settings for reproducing the numbers.
+/// The tables as a document, group by group; `facts` are the settings for reproducing the results.
 pub fn markdown(summaries: &[Summary], facts: &[(&str, String)], command: &str) -> String {
     let notice = summaries.first().and_then(notice);
     document("Evaluation", notice, summaries.iter().flat_map(tables), facts, command)
 }
 
-/// A notice to precede the numbers.
+/// A notice that precedes the tables, if results are missing.
 pub fn notice(summary: &Summary) -> Option<String> {
     incomplete(summary.remaining)
 }
 
-/// A summary of every cell.
+/// A table of every cell.
 fn cells(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("part"),
@@ -68,7 +68,7 @@ fn cells(summary: &Summary) -> Titled {
         Column::number("median").unit("mm").group("alone"),
     ]);
     let mut cells: Vec<_> = summary.cells.iter().collect();
-    // Stable: models keep their order within a part.
+    // The sort is stable: models keep their order within a part.
     cells.sort_by(|a, b| a.object.cmp(&b.object));
     for cell in cells {
         let teaching = match &cell.teaching {
@@ -155,7 +155,7 @@ mod tests {
         assert!(text.contains("| B | 3456 | 2:32 | 8.91 | 12.3 | 1500 | 7:30 | 450 | 20 |"), "{text}");
         assert!(text.contains("B reads the network taught for C, which is taught once."));
         assert!(text.contains("| rod end | 9 of 10 |\n| all | 9 of 10 |"), "{text}");
-        // Failures: one, at the lift, which is the sixth step after teach, detect, hover, approach and close.
+        // There is one failure, at the lift: the sixth step after teach, detect, hover, approach and close.
         assert!(text.contains("| B | 1 of 10 | 0 | 0 | 0 | 0 | 0 | 1 | 0 | 0 |"), "{text}");
         assert!(text.contains("| B | 24 of 25 | 96.0 | 0.65 | – | – | – | 12.3 |"), "{text}");
         assert!(text.contains("the network \\| finds nothing"), "{text}");

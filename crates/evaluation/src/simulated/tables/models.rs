@@ -1,4 +1,4 @@
-//! The models: their structure, the cost of teaching them, and failed teachings.
+//! Tables of the models: their structure, the cost of teaching them, and failed teachings.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
@@ -8,7 +8,7 @@ use crate::simulated::paper;
 use crate::simulated::records::TeachingRecord;
 use crate::simulated::summary::{ModelSummary, Summary};
 
-/// The paper's Table II: costs of a model.
+/// The costs of a model, as in the paper's Table II.
 pub(super) fn costs(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
@@ -42,11 +42,11 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     });
     let mut lead = "Table II of the paper. Samples and teaching are medians over the parts".to_owned();
     if let Some(jobs) = jobs.filter(|jobs| *jobs > 1) {
-        lead += &format!(", each teaching with {jobs} units of work side by side on the same cores");
+        lead += &format!(", each teaching with {jobs} units of work in parallel on the same cores");
     }
     lead += &format!(
-        "; images a second are verified ones, with the machine to itself. The paper's times and speeds are a GTX 1080 \
-         Ti's; on a CPU its model C reaches {} images a second.",
+        "; images per second are with the check, without other load on the machine. The paper's times and speeds are \
+         for a GTX 1080 Ti; on a CPU its model C reaches {} images per second.",
         paper::CPU_FRAMES_PER_SECOND
     );
     if let Some(shared) = shared_networks(summary) {
@@ -55,7 +55,7 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     Titled { title: "Teaching, size and speed".to_owned(), lead, table }
 }
 
-/// A sentence on models that share one network.
+/// A sentence on models that use the same network.
 fn shared_networks(summary: &Summary) -> Option<String> {
     let sharing: Vec<String> = summary
         .models
@@ -66,14 +66,14 @@ fn shared_networks(summary: &Summary) -> Option<String> {
     (!sharing.is_empty()).then(|| format!("{}.", sharing.join("; ")))
 }
 
-/// The paper's Table I.
+/// The models, as in the paper's Table I.
 pub(super) fn models(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
         Column::text("network").group("place"),
         Column::text("output").group("place"),
-        Column::text("network").group("turn"),
-        Column::text("method").group("turn"),
+        Column::text("network").group("angle"),
+        Column::text("method").group("angle"),
         Column::text("human input"),
     ]);
     for model in &summary.models {
@@ -91,7 +91,7 @@ pub(super) fn models(summary: &Summary) -> Titled {
     }
 }
 
-/// Network and output for the position, network and method for the angle, human input.
+/// Network and output for the position, network and method for the angle, and the human input.
 fn description(model: ModelKind) -> [&'static str; 5] {
     match model {
         ModelKind::A => ["Faster R-CNN", "box", "CNN on the box's crop", "classes of the angle", "box, grasp line"],
@@ -101,12 +101,12 @@ fn description(model: ModelKind) -> [&'static str; 5] {
         }
         ModelKind::D => ["Mask R-CNN", "mask", "the same", "mask and SIFT", "outline, grasp line"],
         ModelKind::S => {
-            ["none", "place and turn", "none", "demonstration searched for over all poses", "outline, grasp line"]
+            ["none", "position and angle", "none", "demonstration searched for over all poses", "outline, grasp line"]
         }
     }
 }
 
-/// Teachings without a model.
+/// Teachings that gave no model.
 pub(super) fn not_taught(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![Column::text("part"), Column::text("model"), Column::text("why")]);
     for cell in &summary.cells {
@@ -117,12 +117,12 @@ pub(super) fn not_taught(summary: &Summary) -> Titled {
     }
     Titled {
         title: "Not taught".to_owned(),
-        lead: "Teachings that led to no model. All their attempts count as failed.".to_owned(),
+        lead: "Teachings that gave no model. All their attempts count as failed.".to_owned(),
         table,
     }
 }
 
-/// Samples of the detector, and crops of the orientation CNN if there is one.
+/// Number of samples for the detector, and of crops for the orientation CNN if there is one.
 fn samples(model: &ModelSummary) -> String {
     match (model.samples, model.crops) {
         (Some(samples), Some(crops)) => format!("{samples:.0} + {crops:.0}"),
@@ -131,7 +131,7 @@ fn samples(model: &ModelSummary) -> String {
     }
 }
 
-/// Minutes and seconds, in the paper's notation.
+/// Minutes and seconds in the paper's notation.
 fn minutes(secs: f64) -> String {
     let secs = secs.round() as u64;
     if secs == 0 { "under 0:01".to_owned() } else { format!("{}:{:02}", secs / 60, secs % 60) }

@@ -1,26 +1,26 @@
-//! A table with its heading, and cells used in several tables.
+//! A table with a heading, and cells that several tables use.
 
 use sdg_report::{Cell, Table, Tone};
 
 use crate::simulated::summary::{Figures, ModelSummary};
 use crate::statistics::Share;
 
-/// A table with its heading.
+/// A table with a heading.
 pub struct Titled {
     pub title: String,
-    /// One or two sentences on its contents.
+    /// One or two sentences about the table.
     pub lead: String,
     pub table: Table,
 }
 
-/// With the check and, for models with a network, without it.
+/// The results with the check and, for models with a network, without it.
 pub(super) fn ways(model: &ModelSummary) -> impl Iterator<Item = (String, &Figures)> {
     debug_assert_eq!(model.alone.is_some(), model.model.has_network());
     let alone = model.alone.as_ref().map(|figures| (format!("{}, alone", model.model), figures));
     std::iter::once((model.model.to_string(), &model.verified)).chain(alone)
 }
 
-/// A share as text, with a tone unless it is plain; a dash if nothing was counted.
+/// A fraction as text, with a tone unless it is plain; a dash if its total is zero.
 pub(crate) fn share(share: Share, tone: Tone) -> Cell {
     match (share.of, tone) {
         (0, _) => Cell::text("–"),
@@ -29,7 +29,7 @@ pub(crate) fn share(share: Share, tone: Tone) -> Cell {
     }
 }
 
-/// A number, or a missing cell.
+/// A number, or an empty cell.
 pub(crate) fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or(Cell::missing(), |value| Cell::number(value, decimals))
 }

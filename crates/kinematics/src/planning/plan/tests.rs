@@ -14,7 +14,7 @@ fn table() -> Obstacle {
     obstacle("table", Shape::Plane, [0.0, 0.0, 0.0])
 }
 
-/// A wall between the two sides of the table, as high as the elbow.
+/// A wall as high as the elbow, which divides the table into two sides.
 fn wall() -> Obstacle {
     obstacle("wall", Shape::Box { half_m: [0.25, 0.02, 0.25] }, [0.55, 0.0, 0.25])
 }
@@ -23,7 +23,7 @@ fn cell(obstacles: Vec<Obstacle>) -> CollisionModel {
     CollisionModel::new(&ArmGeometry::panda(), obstacles, 0.08).unwrap()
 }
 
-/// On one side of the wall, the hand low.
+/// The hand is low on one side of the wall.
 fn start() -> JointVector {
     let pose = top_grasp(0.5, 0.3, 0.15, 0.0);
     ArmGeometry::panda().inverse(&pose, &ready_pose(), &Default::default()).unwrap().q
@@ -41,7 +41,7 @@ fn motions(plan: &Plan) -> Vec<Trajectory> {
 
 #[test]
 fn corners_are_round_free_and_quicker_than_stops() {
-    // Every stop means braking and accelerating: at least 0.2 seconds at full speed.
+    // Every stop requires braking and accelerating, which takes at least 0.2 s at full speed.
     const MIN_SAVED_SECS: f64 = 0.1;
     let model = cell(vec![table(), wall()]);
     let goal = top_grasp(0.5, -0.3, 0.15, 0.0);
@@ -134,7 +134,7 @@ fn an_approach_ends_at_the_grasp_and_may_touch_what_is_allowed() {
     assert!((path.distance_m() - 0.1).abs() < 1e-9);
     assert_eq!(path.start(), &found.waypoints[found.waypoints.len() - 1]);
     assert!(pose_error(&ArmGeometry::panda().forward(path.end()), &grasp).norm() < 1e-8);
-    // A plate over the part, between the fingers' path and the part.
+    // A plate above the part, in the path of the fingers.
     let plate = obstacle("plate", Shape::Box { half_m: [0.06, 0.06, 0.003] }, [0.5, -0.3, 0.1]);
     let mut covered = cell(vec![table(), plate, model.obstacles()[2].clone()]);
     covered.allow(Body::HAND, "part").unwrap();
@@ -215,7 +215,7 @@ fn obstacles_that_make_no_sense_are_refused() {
 
 #[test]
 fn a_cage_is_an_error_that_names_its_bars() {
-    // Four walls and a lid around the hand at its start, too close to turn in.
+    // Four walls and a lid around the hand at its start, too close for the hand to rotate.
     let half = 0.02;
     let walls = [
         ("left", [0.2, half, 0.25], [0.5, 0.48, 0.25]),
@@ -226,8 +226,7 @@ fn a_cage_is_an_error_that_names_its_bars() {
     let mut obstacles: Vec<Obstacle> =
         walls.iter().map(|(name, half_m, at)| obstacle(name, Shape::Box { half_m: *half_m }, *at)).collect();
     obstacles.push(table());
-    // The arm itself enters from above; a goal outside at the same height cannot be reached without leaving through the
-    // top.
+    // The arm itself enters from above. A goal outside at the same height can only be reached through the top.
     let lid = Isometry3::from_parts(Vector3::new(0.5, 0.3, 0.55).into(), UnitQuaternion::identity());
     obstacles.push(Obstacle {
         name: "lid".to_owned(),
