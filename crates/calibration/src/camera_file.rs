@@ -205,8 +205,14 @@ impl CalibratedCamera {
             (Some(a), Some(b)) => (a.to_homogeneous() - b.to_homogeneous()).norm() < MAX_QUATERNION_ERROR,
             (a, b) => a == b,
         };
-        (&self.name, self.intrinsics) == (&other.name, other.intrinsics)
-            && poses(self).into_iter().zip(poses(other)).all(is_near)
+        let without_poses = |camera: &Self| {
+            let mut camera = Self { flange_from_camera: None, ..camera.clone() };
+            if let Some(table) = &mut camera.table {
+                table.frame_from_camera = Isometry3::identity();
+            }
+            camera
+        };
+        without_poses(self) == without_poses(other) && poses(self).into_iter().zip(poses(other)).all(is_near)
     }
 
     fn sections(&self) -> Vec<(&'static str, String)> {
@@ -459,6 +465,25 @@ table:
         assert_eq!(read(&named.to_yaml()).unwrap(), named);
         let on_hand = CalibratedCamera { flange_from_camera: Some(Isometry3::translation(0.05, 0.0, 0.06)), ..named };
         assert_eq!(read(&on_hand.to_yaml()).unwrap(), on_hand);
+    }
+
+    #[test]
+    fn cameras_that_differ_in_one_value_are_not_near() {
+        let camera = read(&format!("{OF_ROS}{TABLE}")).unwrap();
+        assert!(camera.is_near(&camera));
+        let changes: [&dyn Fn(&mut CalibratedCamera); 6] = [
+            &|camera| camera.name.push('2'),
+            &|camera| camera.intrinsics.fx += 1.0,
+            &|camera| camera.flange_from_camera = Some(Isometry3::identity()),
+            &|camera| camera.table.as_mut().unwrap().height_m += 0.001,
+            &|camera| camera.table.as_mut().unwrap().workspace = None,
+            &|camera| camera.table.as_mut().unwrap().frame_from_camera.translation.z += 0.01,
+        ];
+        for (index, change) in changes.iter().enumerate() {
+            let mut changed = camera.clone();
+            change(&mut changed);
+            assert!(!changed.is_near(&camera), "change {index}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -17,6 +17,12 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// Time that a second client waits for the end of the first, so that a client that has just disconnected can connect
 /// again at once. It is shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
+/// Number of events that wait for the loop; beyond it, a client's further messages wait in the network.
+const MAX_EVENTS: usize = 64;
+/// Number of datagrams read in one call, so that a flood of datagrams of others does not delay the loop.
+const MAX_DATAGRAMS: usize = 64;
+/// Time until the next attempt if no connection can be accepted, for example because no file descriptor is free.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(10);
 
 /// Messages from the listening thread and the reading thread to the loop.
 #[derive(Debug)]
@@ -59,7 +65,7 @@ pub struct Link {
     address: SocketAddr,
     udp: UdpSocket,
     events: Receiver<LinkEvent>,
-    sender: Sender<LinkEvent>,
+    sender: SyncSender<LinkEvent>,
     client: Option<Client>,
     waiting: Option<WaitingClient>,
     num_sessions: u64,
@@ -78,7 +84,7 @@ impl Link {
         let address = listener.local_addr().map_err(failed)?;
         let udp = UdpSocket::bind((ip, 0)).map_err(failed)?;
         udp.set_nonblocking(true).map_err(failed)?;
-        let (sender, events) = channel();
+        let (sender, events) = sync_channel(MAX_EVENTS);
         let is_stopping = Arc::new(AtomicBool::new(false));
         let accepted = (sender.clone(), is_stopping.clone());
         let thread = thread::Builder::new()
@@ -156,7 +162,7 @@ impl Link {
     /// The next datagram of the client, without waiting, and its length.
     pub fn receive(&self, buffer: &mut [u8]) -> Option<usize> {
         let peer = self.udp_peer()?;
-        loop {
+        for _ in 0..MAX_DATAGRAMS {
             match self.udp.recv_from(buffer) {
                 Ok((length, from)) if from == peer => return Some(length),
                 Ok(_) => {}
@@ -164,6 +170,7 @@ impl Link {
                 Err(_) => return None,
             }
         }
+        None
     }
 
     /// Makes [`Link::receive`] wait for a datagram for a short time, or not at all.
@@ -240,17 +247,25 @@ impl Drop for Link {
         // This connection wakes the thread that waits for clients.
         let _ = TcpStream::connect_timeout(&self.address, WRITE_TIMEOUT);
         if let Some(listener) = self.listener.take() {
+            // The thread may wait for room for an event.
+            while !listener.is_finished() {
+                while self.events.try_recv().is_ok() {}
+                thread::sleep(Duration::from_millis(1));
+            }
             let _ = listener.join();
         }
     }
 }
 
-fn accept(listener: &TcpListener, sender: &Sender<LinkEvent>, is_stopping: &AtomicBool) {
+fn accept(listener: &TcpListener, sender: &SyncSender<LinkEvent>, is_stopping: &AtomicBool) {
     for stream in listener.incoming() {
         if is_stopping.load(Ordering::Relaxed) {
             return;
         }
-        let Ok(stream) = stream else { continue };
+        let Ok(stream) = stream else {
+            thread::sleep(ACCEPT_PAUSE);
+            continue;
+        };
         let Ok(address) = stream.peer_addr() else { continue };
         if sender.send(LinkEvent::Connected(stream, address)).is_err() {
             return;
@@ -258,7 +273,7 @@ fn accept(listener: &TcpListener, sender: &Sender<LinkEvent>, is_stopping: &Atom
     }
 }
 
-fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: &Sender<LinkEvent>) {
+fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: &SyncSender<LinkEvent>) {
     loop {
         let event = match read_message(&mut stream, kind) {
             Ok(Ok((header, payload))) => LinkEvent::Message(session, header, payload),
@@ -269,5 +284,32 @@ fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: 
         if sender.send(event).is_err() || is_end {
             return;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_client_that_floods_the_server_takes_no_memory() {
+        const PAYLOAD: usize = 64 << 10;
+        // 64 events and one that is being read are 4.3 MB; both sides of a connection hold some 6 MB.
+        const MAX_TAKEN: usize = 32 << 20;
+        let mut link = Link::listen([127, 0, 0, 1].into(), 0, HeaderKind::Robot).unwrap();
+        let mut client = TcpStream::connect(link.address()).unwrap();
+        client.set_write_timeout(Some(Duration::from_millis(300))).unwrap();
+        let request = Header::message(HeaderKind::Robot, 0, 1, &[0; PAYLOAD]);
+        client.write_all(&request).unwrap();
+        let begin = Instant::now();
+        while link.poll().is_none() {
+            assert!(begin.elapsed() < Duration::from_secs(20), "no request arrived");
+            thread::sleep(Duration::from_millis(1));
+        }
+        let mut num_sent = 0;
+        while num_sent < 4 * MAX_TAKEN && client.write_all(&request).is_ok() {
+            num_sent += request.len();
+        }
+        assert!(num_sent < MAX_TAKEN, "{num_sent} bytes of at most {MAX_TAKEN}");
     }
 }

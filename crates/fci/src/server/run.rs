@@ -22,6 +22,10 @@ use crate::wire::{
 const VERSION: Version = Version::V5;
 /// Duration of a cycle.
 const PERIOD: Duration = Duration::from_millis(1);
+/// Numbers of requests and of datagrams that are handled before the loop looks at its clock again: a client that floods
+/// the server does not stop the arm's control.
+const MAX_REQUESTS: usize = 64;
+const MAX_COMMANDS: usize = 64;
 /// Interval of the hand's states, in cycles.
 const HAND_STATE_CYCLES: u64 = 20;
 /// In lockstep, maximum wait for an answer at the start of a motion: libfranka leaves the first one or two states
@@ -251,7 +255,8 @@ impl Loop {
     fn receive_command(&mut self) -> Option<RobotCommand> {
         // One byte more than a command, to detect datagrams that are too long.
         let mut buffer = [0; COMMAND_SIZE_V5 + 1];
-        while let Some(length) = self.robot_link.receive(&mut buffer) {
+        for _ in 0..MAX_COMMANDS {
+            let length = self.robot_link.receive(&mut buffer)?;
             match RobotCommand::decode(&buffer[..length], VERSION) {
                 Ok(command) if command.message_id == self.robot.time_ms() => return Some(command),
                 Ok(_) => self.statistics.num_late += u64::from(self.robot.expects_commands().is_some()),
@@ -262,13 +267,15 @@ impl Loop {
     }
 
     fn serve_requests(&mut self) {
-        while let Some(incoming) = self.robot_link.poll() {
+        for _ in 0..MAX_REQUESTS {
+            let Some(incoming) = self.robot_link.poll() else { break };
             match incoming {
                 Incoming::Gone => self.robot.disconnect(),
                 Incoming::Request(header, payload) => self.serve_robot_request(&header, &payload),
             }
         }
-        while let Some(incoming) = self.hand_link.poll() {
+        for _ in 0..MAX_REQUESTS {
+            let Some(incoming) = self.hand_link.poll() else { break };
             match incoming {
                 Incoming::Gone => self.hand.disconnect(self.plant.as_mut()),
                 Incoming::Request(header, payload) => self.serve_hand_request(&header, &payload),
