@@ -67,6 +67,10 @@ fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
     // A contact deeper than was allowed for the descent.
     let deep = FeltBelow::new(&Vector3::new(x, y, 0.03), LOWEST_ALLOWED_M - 0.020, 0.010);
     assert!(check(Some(&deep), [x, y, LOWEST_ALLOWED_M - 0.015], [x, y, 0.10]).is_err());
+    // The tolerance of the ascent applies to that limit too: 0.3 mm deeper is allowed, 0.7 mm is not.
+    let from = |deeper_m: f64| [x, y, LOWEST_ALLOWED_M - 0.010 - deeper_m];
+    check(Some(&deep), from(0.0003), [x, y, 0.10]).unwrap();
+    assert!(check(Some(&deep), from(0.0007), [x, y, 0.10]).is_err());
 }
 
 #[test]
