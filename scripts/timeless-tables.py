@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 TIMES = {"seconds", "teaching_secs", "longest_teaching_secs", "frames_per_second", "bytes", "largest_bytes"}
-TIME_COLUMNS = ("images a second", "teaching, ")
+TIME_COLUMNS = ("images per second", "teaching, ")
 
 
 def timeless(value):

@@ -82,7 +82,7 @@ fn without_times(text: &str) -> String {
         let cells: Vec<&str> = line.split('|').collect();
         if cells.len() > 1 {
             if !last_was_row {
-                let is_time = |cell: &str| ["images a second", "teaching, "].iter().any(|time| cell.contains(time));
+                let is_time = |cell: &str| ["images per second", "teaching, "].iter().any(|time| cell.contains(time));
                 times = (0..cells.len()).filter(|&i| is_time(cells[i])).collect();
             }
             let kept = cells.iter().enumerate().filter(|(i, _)| !times.contains(i)).map(|(_, cell)| *cell);

@@ -47,7 +47,7 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
         Column::number("x").unit("mm").group("part position"),
         Column::number("y").unit("mm").group("part position"),
         Column::number("angle").unit("°").group("part position"),
-        Column::number("place").unit("mm").group("detection error"),
+        Column::number("position").unit("mm").group("detection error"),
         Column::number("angle").unit("°").group("detection error"),
         Column::number("time").unit("s"),
     ]);

@@ -198,7 +198,7 @@ def main():
             results[label][name] = detect_opencv(sift, images[name], center)
 
     print(f"OpenCV {cv2.__version__}, {len(pictures)} pictures, {len(plan)} views, ratio {RATIO}\n")
-    print("| pictures | views | | keypoints | repeatability | matching score | precision | right matches |")
+    print("| pictures | views | program | keypoints | repeatability | matching score | precision | right matches |")
     print("|---|---|---|---|---|---|---|---|")
     bases = sorted({base for base, *_ in plan})
     for chosen in [[base] for base in bases] + [bases]:

@@ -185,8 +185,8 @@ fn table(evaluated: &Evaluated, judged: &[Judged], order: &[usize]) -> Table {
         Column::number("found"),
         Column::number("wrong"),
         Column::number("best score"),
-        Column::number("place").unit("px").group("largest error"),
-        Column::number("place").unit("%").group("largest error"),
+        Column::number("position").unit("px").group("largest error"),
+        Column::number("position").unit("%").group("largest error"),
         Column::number("angle").unit("°").group("largest error"),
         Column::number("time").unit("s"),
     ]);

@@ -136,10 +136,10 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
             table = table.row(row);
         }
     }
-    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, along which the \
-                difficulty increases: height relative to the usual one, tilt in degrees, covered as a fraction of the \
-                part, dark as a fraction of the usual light, blur in pixels; the parameters of the other axes are \
-                counts or ratios.";
+    let lead = "Instances found with the check, in the first, the middle and the last third of each axis' pictures. The \
+                difficulty increases along the axis. \"From\" and \"to\" are the height relative to the usual one, the \
+                tilt in degrees, the covered fraction of the part, the light as a fraction of the usual light, and the \
+                blur in pixels; the parameters of the other axes are counts or ratios.";
     ("found, by difficulty along the axis".to_owned(), lead.to_owned(), table)
 }
 

@@ -39,9 +39,9 @@ fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
     columns.extend([
         Column::text("found"),
         Column::number("wrong"),
-        Column::number("median").unit("mm").group("place"),
-        Column::number("95 %").unit("mm").group("place"),
-        Column::text("within sigma").group("place"),
+        Column::number("median").unit("mm").group("position"),
+        Column::number("95 %").unit("mm").group("position"),
+        Column::text("within sigma").group("position"),
         Column::number("median").unit("°").group("angle"),
         Column::number("95 %").unit("°").group("angle"),
         Column::text("within sigma").group("angle"),

@@ -12,11 +12,11 @@ pub(super) fn accuracy(summary: &Summary) -> Titled {
         Column::text("model"),
         Column::text("right"),
         Column::number("right").unit("%"),
-        Column::number("median").unit("mm").group("place"),
-        Column::number("90 %").unit("mm").group("place"),
+        Column::number("median").unit("mm").group("position"),
+        Column::number("90 %").unit("mm").group("position"),
         Column::number("median").unit("°").group("angle"),
         Column::number("90 %").unit("°").group("angle"),
-        Column::number("images a second"),
+        Column::number("images per second"),
     ]);
     for model in &summary.models {
         for (name, figures) in ways(model) {

@@ -15,11 +15,11 @@ pub(super) fn costs(summary: &Summary) -> Titled {
         Column::text("samples").group("ours"),
         Column::text("teaching, min:s").group("ours"),
         Column::number("size").unit("MB").group("ours"),
-        Column::number("images a second").group("ours"),
+        Column::number("images per second").group("ours"),
         Column::text("samples").group("paper"),
         Column::text("training, min:s").group("paper"),
         Column::text("size, MB").group("paper"),
-        Column::text("images a second").group("paper"),
+        Column::text("images per second").group("paper"),
     ]);
     for model in &summary.models {
         let paper = paper::row(model.model);
@@ -70,8 +70,8 @@ fn shared_networks(summary: &Summary) -> Option<String> {
 pub(super) fn models(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![
         Column::text("model"),
-        Column::text("network").group("place"),
-        Column::text("output").group("place"),
+        Column::text("network").group("position"),
+        Column::text("output").group("position"),
         Column::text("network").group("angle"),
         Column::text("method").group("angle"),
         Column::text("human input"),
