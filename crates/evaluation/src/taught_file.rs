@@ -20,7 +20,7 @@ pub struct TaughtFile {
 }
 
 impl TaughtFile {
-    /// Teaches a model; `observe` may end the teaching early.
+    /// Teaches a model; `observe` may end teaching early.
     ///
     /// # Errors
     /// The errors of [`teach`].

@@ -15,9 +15,9 @@ pub const LOSS_STEPS: usize = 10;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TeachingRecord {
-    /// The teaching gave a model.
+    /// Teaching gave a model.
     Taught {
-        /// The model's description of the teaching.
+        /// The model's description of its teaching run.
         facts: Box<TeachingFacts>,
         /// Size of the model file.
         bytes: usize,

@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Each JSON file contains the settings with which it was made, and is written atomically. A teaching contains only the
-//! settings of teachings, so that the protocol and the axes use the same teachings for any number of attempts or
-//! pictures.
+//! settings of teaching runs, so that the protocol and the axes use the same teaching runs for any number of attempts
+//! or pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -63,7 +63,7 @@ structure! {
         message: String,
         /// Path of the grasp model.
         model_path: String,
-        /// Duration of the teaching.
+        /// Duration of teaching.
         seconds: f64,
     }
 }

@@ -77,7 +77,7 @@ impl CamerasEvaluation<'_> {
         self.store.read_made_with(&file(cell, set), &self.settings())
     }
 
-    /// Whether the teaching of a cell gave no model.
+    /// Whether teaching for a cell gave no model.
     pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
         cell.is_without_model(Marks::InPlanView, self.store)
     }

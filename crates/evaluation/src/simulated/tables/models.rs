@@ -1,4 +1,4 @@
-//! Tables of the models: their structure, the cost of teaching them, and failed teachings.
+//! Tables of the models: their structure, the cost of teaching them, and failed teaching runs.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
