@@ -22,7 +22,7 @@ pub struct CameraTeaching {
     pub grasp_height_m: f64,
 }
 
-/// The inputs of a teaching.
+/// The inputs of a teaching run.
 #[derive(Debug, Clone)]
 pub struct Teaching {
     /// Photo and marks of each demonstration.

@@ -9,7 +9,7 @@ use sdg_grasp::{GraspError, GraspModel, Taught, TeachOptions, TeachingEvent, tea
 
 use crate::held_back::HeldBackFigures;
 
-/// The result of a teaching.
+/// The result of a teaching run.
 pub struct TaughtFile {
     /// The model in memory and its history.
     pub taught: Taught,

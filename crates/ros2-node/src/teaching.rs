@@ -11,7 +11,7 @@ use sdg_inputs::one_line;
 use sdg_ros2::messages::TeachRequest;
 use tempfile::TempPath;
 
-/// The inputs of a teaching.
+/// The inputs of a teaching run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
     /// The photo, followed by a colon and the file of its marks if that is not beside the photo.

@@ -24,7 +24,7 @@ pub struct PartRecord {
     pub outcome: PartOutcome,
 }
 
-/// The outcome of a teaching.
+/// The outcome of a teaching run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartOutcome {

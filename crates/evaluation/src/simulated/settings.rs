@@ -50,7 +50,7 @@ impl Settings {
         }
     }
 
-    /// The settings on which a teaching depends.
+    /// The settings on which a teaching run depends.
     pub fn teaching(&self) -> TeachingSettings {
         TeachingSettings {
             preset: self.preset.clone(),

@@ -31,8 +31,8 @@ pub(crate) struct NegativeScenes {
     demonstrations: Vec<TaughtDemonstration>,
 }
 
-/// Photos with more pixels are halved before scenes are composed from them. Chosen for time: model S must be taught in
-/// a second.
+/// Photos with more pixels are halved before scenes are composed from them. Chosen to save time: model S must be taught
+/// in a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
 impl NegativeScenes {

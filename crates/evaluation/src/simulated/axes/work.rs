@@ -43,7 +43,7 @@ impl AxesEvaluation<'_> {
     /// the next run.
     ///
     /// # Errors
-    /// The store cannot be read. A teaching without a model is not an error.
+    /// The store cannot be read. A teaching run without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<RunEnd> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());

@@ -58,7 +58,7 @@ impl CamerasEvaluation<'_> {
     /// Runs the remaining units until `is_interrupted` is true.
     ///
     /// # Errors
-    /// The first error of a unit; or the store cannot be read. A teaching without a model is not an error.
+    /// The first error of a unit; or the store cannot be read. A teaching run without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<()> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());

@@ -106,7 +106,7 @@ fn description(model: ModelKind) -> [&'static str; 5] {
     }
 }
 
-/// Teachings that gave no model.
+/// Teaching runs that gave no model.
 pub(super) fn not_taught(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![Column::text("part"), Column::text("model"), Column::text("why")]);
     for cell in &summary.cells {
