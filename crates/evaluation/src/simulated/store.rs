@@ -11,9 +11,9 @@
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
 //! ```
 //!
-//! Each JSON file contains the settings with which it was made, and is written atomically. Results of teaching contain only the
-//! settings of teaching runs, so that the protocol and the axes use the same teaching runs for any number of attempts
-//! or pictures.
+//! Each JSON file contains the settings with which it was made, and is written atomically. Results of teaching
+//! contain only the settings of teaching, so that the protocol and the axes use the same models for any number of
+//! attempts or pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -133,7 +133,7 @@ impl Session {
     /// Processes the received messages.
     ///
     /// # Errors
-    /// [`FciError::Closed`] if the peer is disconnected.
+    /// [`FciError::Closed`] if the peer is disconnected, [`FciError::Wire`] for an invalid message.
     fn fetch(&mut self) -> Result<()> {
         loop {
             match self.incoming.try_recv() {
