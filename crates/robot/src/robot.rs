@@ -87,7 +87,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// The straight motion in joint space to a configuration, as fast as `joints` and the tcp's limits allow.
     ///
     /// # Errors
-    /// [`RobotError::Planning`].
+    /// [`RobotError::Planning`], and the errors of [`Self::commanded`].
     pub fn plan_free(&mut self, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
         let start = self.commanded()?;
         self.slowed(|share| {
