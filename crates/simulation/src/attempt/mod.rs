@@ -47,6 +47,7 @@ impl Default for AttemptConfig {
 /// Cartesian space. Joint motions have limits for each joint only, and at the pace of rehearsals they rotate the hand
 /// at up to twice that velocity.
 const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
+/// Limit of the hand's angular acceleration in rehearsals, rad/s².
 const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
 
 impl Workcell {
