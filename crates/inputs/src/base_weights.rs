@@ -54,7 +54,7 @@ pub fn read_own(
 /// Opens a checkpoint of any format.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read, or is not a checkpoint.
 pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     let named = || path.display().to_string();
     let mut source = Source::open(path).with_context(named)?;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: checked against the photo ─ Demonstration
-//! camera.yaml ─ CalibratedCamera ─ Perception, plan views         TeachingFiles: all that a model is taught from
+//! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!

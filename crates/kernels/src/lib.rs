@@ -10,6 +10,7 @@
 //!   └─ KernelBackend::kernel_conv2d       the backend extension: one method per operation
 //!        ├─ Flex                          hand-written kernel on f32 slices
 //!        ├─ Autodiff<Flex>                the same, with a hand-written backward
+//!        ├─ Cube                          ROIAlign on wgpu and CUDA; otherwise the default body
 //!        └─ any other backend             the default body: burn's own tensor operations
 //! ```
 //!
@@ -18,7 +19,7 @@
 //! float type takes the composed default. Results are bit-identical for any number of threads.
 //!
 //! Deliberately not included: groups and dilation (no detector here has them), gradients with respect
-//! to ROI coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.
+//! to ROI coordinates (the R-CNN family treats proposals as constants), and GPU kernels other than ROIAlign's.
 //!
 //! ```
 //! use burn::tensor::{Device, Tensor};

@@ -1,4 +1,4 @@
-//! Errors of a workcell during grasps: a wrong camera pose, worn pads, a shaken hand, faults of the arm, joint friction.
+//! Errors of a workcell: a wrong camera pose, worn pads, a shaken hand, faults of the arm, joint friction.
 
 use std::f64::consts::TAU;
 

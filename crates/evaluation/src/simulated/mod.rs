@@ -14,7 +14,7 @@
 //! scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats
 //! them.
 //!
-//! In [`sharing`], many processes do the same units, on the machines of a cluster.
+//! In [`sharing`], many processes share the units, on the machines of a cluster.
 //!
 //! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching run without a
 //! model is a result as well: all attempts of its cell count as failed.

@@ -79,7 +79,7 @@ pub struct Taught {
 ///
 /// # Errors
 /// No demonstration, a demonstration that lacks marks required by the model or is among the pictures without the part,
-/// or a training without a usable result.
+/// a region in which the part cannot be searched, missing base weights, or a training without a usable result.
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,

@@ -39,7 +39,7 @@ impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.
     ///
     /// # Errors
-    /// As for [`Augmenter::new`].
+    /// As for [`Augmenter::new`]; a demonstration from which nothing can be taught.
     pub(crate) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
         // No pieces of the part: they agree with it, but do not occur on a table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };

@@ -144,7 +144,7 @@ impl Workcell {
     /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
     ///
     /// # Errors
-    /// An error if the arm cannot reach the first look-out pose.
+    /// An error if the arm cannot reach the first look-out pose; the errors of [`Workcell::reset`].
     pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
         let start = self.random_start(config, seed)?;
         self.reset(&start)

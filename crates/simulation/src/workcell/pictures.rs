@@ -17,7 +17,8 @@ impl Workcell {
     /// The wrist camera's present picture.
     ///
     /// # Errors
-    /// As for [`crate::Data::forward`] and [`Renderer::image`].
+    /// As for [`crate::Data::forward`] and [`Renderer::image`]; [`SimulationError::Configuration`] for a lens whose
+    /// model does not cover the corners of its own picture.
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // After a step, body positions are one period behind the joints.
         self.data.forward()?;
