@@ -47,7 +47,7 @@ structure! {
         mark_height_mm: f64,
         /// Maximum time for training; 0 for no limit.
         time_budget_secs: f64,
-        /// Seed of the training samples.
+        /// Seed of the training samples; 0 means 1.
         seed: u64,
         /// Whether the node then uses the model for detection.
         use_it: bool,
