@@ -183,7 +183,7 @@ impl Asked<'_> {
         most * (2.0 * self.rng.random::<f64>() - 1.0)
     }
 
-    /// A random pose near `pose`: at most `share` of the errors of a correct pose away from it.
+    /// A random pose near `pose`: its differences are at most the fraction `share` of the errors of a correct pose.
     fn near(&mut self, shown: &Shown, pose: &PlanarSimilarity, share: f64) -> PlanarSimilarity {
         let reach = share * MAX_SHIFT * shown.length;
         let shift = Vector2::new(self.within(reach), self.within(reach));

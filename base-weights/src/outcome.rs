@@ -1,8 +1,8 @@
-//! The outcome of one teaching, as a line of JSON.
+//! The outcome of one teaching run, as a line of JSON.
 
 use serde::{Deserialize, Serialize};
 
-/// The outcome of one teaching.
+/// The outcome of one teaching run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The name of the weights.

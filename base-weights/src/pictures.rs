@@ -144,8 +144,8 @@ pub fn look_alike_of(part_idx: usize) -> usize {
     part_idx ^ 1
 }
 
-/// The keypoints on the grasp line, start to end, in pixels of the network's input; keypoints outside the box are
-/// unlabelled.
+/// The keypoints on the grasp line, start to end, in pixels of the network's input. Keypoints outside the box, and all
+/// keypoints of a symmetric part, are unlabelled.
 fn keypoints(grasp: &GraspLine, is_symmetric: bool, bbox: &BoundingBox, [sx, sy]: [f64; 2]) -> Vec<Keypoint> {
     let labelled = |keypoint: Keypoint| {
         let visibility = match !is_symmetric && bbox.contains(&keypoint.point()) {

@@ -103,7 +103,7 @@ impl<T: Task> Run<T> {
     /// Resumes from the checkpoint at a path, or starts a run if the file does not exist.
     ///
     /// # Errors
-    /// A checkpoint of a run with other settings.
+    /// A file that is not a checkpoint, or a checkpoint of another network or of a run with other settings.
     pub fn start_or_resume(task: T, path: &Path, settings: Settings, device: &Device) -> Result<Self> {
         if !path.exists() {
             return Self::start(task, settings, device);
@@ -138,7 +138,7 @@ impl<T: Task> Run<T> {
     /// Does one step and returns its losses.
     ///
     /// # Errors
-    /// A loss that is not finite.
+    /// A loss that is not finite; the errors of [`Task::losses`].
     pub fn advance(&mut self) -> Result<Vec<(&'static str, f64)>> {
         let losses = self.task.losses(&self.network, &self.settings, self.step)?;
         let value = |loss: &Tensor<1>| f64::from(loss.clone().into_scalar::<f32>());

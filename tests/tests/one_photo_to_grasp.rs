@@ -67,7 +67,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
     assert!(failures.len() <= 1, "{failures:?}");
 }
 
-/// Losses of the first steps of a teaching, which ends without a model.
+/// Losses of the first steps of a teaching run, which ends without a model.
 fn first_losses(seed: u64) -> Vec<f64> {
     const STEPS: usize = 3;
     let demonstration = shipped::demonstration("rod_end").unwrap();

@@ -103,7 +103,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// A file of another format, a truncated or altered one, one that requests the execution of code, or one that
-    /// requests more memory than it has bytes.
+    /// requests much more memory than it has bytes.
     pub fn read(source: &mut Source) -> Result<Self> {
         let format = FileFormat::detect(source)?;
         let checkpoint = match format {

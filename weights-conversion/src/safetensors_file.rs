@@ -75,7 +75,7 @@ pub(crate) fn is_safetensors(start: &[u8], len: u64) -> bool {
 /// Reads the header; the tensors' bytes stay in the file.
 ///
 /// # Errors
-/// A header that is not JSON of that form, or that does not match the file's bytes.
+/// A header that is too large, is not JSON of that form, or does not match the file's bytes.
 pub(crate) fn read(source: &mut Source) -> Result<Content> {
     let mut header_len = [0; 8];
     source.read_at(0, &mut header_len)?;

@@ -123,7 +123,8 @@ impl Conversion {
         metadata
     }
 
-    /// Parameters in the order of the file: the format requires wider elements first, so that all are aligned.
+    /// Parameters in the order of the file: wider elements first, as in the reference implementation, so that all are
+    /// aligned.
     fn in_file_order(&self, precision: Precision) -> impl Iterator<Item = (&String, &Planned, Precision)> {
         let all = move |wanted| {
             self.parameters.iter().filter_map(move |(name, planned)| {

@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, TeacherError};
 use crate::region::Region;
 
-/// Maximum number of steps of a teaching.
+/// Maximum number of steps of a teaching run.
 const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
     /// Teaches a model; with a network this takes half a minute or more. `observe` receives the progress and may end
-    /// the teaching, which then keeps its current result.
+    /// the teaching run, which then keeps its current result.
     ///
     /// # Errors
     /// Any error of teaching, as one line for the user.
@@ -52,7 +52,7 @@ pub trait GraspTeacher: Send + Sync + 'static {
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError>;
 }
 
-/// The inputs of a teaching.
+/// The inputs of a teaching run.
 #[derive(Debug, Clone, Default)]
 pub struct TeachingMaterial {
     /// Photos of the part with their marks.
@@ -97,7 +97,7 @@ pub trait TaughtModel: Send + Sync {
     }
 }
 
-/// Settings of a teaching, as given on the page.
+/// Settings of a teaching run, as given on the page.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TeachRequest {
@@ -137,6 +137,8 @@ impl TeachRequest {
         self.time_budget_secs.and_then(|secs| Duration::try_from_secs_f64(secs).ok())
     }
 
+    /// Checks that the numbers are in range.
+    ///
     /// # Errors
     /// The time limit, the number of steps or the number of turns is out of range.
     pub(crate) fn check(&self) -> crate::error::Result<()> {
@@ -159,14 +161,14 @@ impl TeachRequest {
     }
 }
 
-/// A progress report of a teaching.
+/// A progress report of a teaching run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TeachingStep {
     /// An optimiser step was done.
     Step {
-        /// The network being trained: `the network`, `its angles`.
+        /// The network being trained: `the network`, `the angles`.
         of: &'static str,
-        /// Whether it is the last network of this teaching.
+        /// Whether it is the last network of this teaching run.
         is_last: bool,
         /// Number of finished steps.
         done: usize,
@@ -175,7 +177,7 @@ pub enum TeachingStep {
         /// The loss before the step.
         loss: f64,
     },
-    /// The model was tested on held-back samples.
+    /// The model was tested on held-out samples.
     Validated {
         /// Steps done before the test.
         done: usize,
@@ -191,15 +193,15 @@ pub struct TaughtSummary {
     pub model: ModelKind,
     /// The object's name.
     pub object: String,
-    /// Wall-clock time of the teaching and of the test on held-back samples.
+    /// Wall-clock time of teaching and of the test on held-out samples.
     pub seconds: f64,
-    /// Results of the finished model on held-back samples; `None` if it was not tested.
+    /// Results of the finished model on held-out samples; `None` if it was not tested.
     pub figures: Option<Figures>,
     /// Results on the pictures without the part.
     pub negatives: Option<NegativesRefused>,
 }
 
-/// Results of a finished model on held-back samples.
+/// Results of a finished model on held-out samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Number of detected parts, and of all parts.
@@ -277,8 +279,8 @@ pub struct GraspPose {
     pub yaw_deg: f64,
     /// Opening of the jaws, mm.
     pub opening_mm: f64,
-    /// Standard deviation of the position, mm.
+    /// Radius in mm that contains the position's error in 68 % of cases.
     pub sigma_mm: f64,
-    /// Standard deviation of the rotation, degrees.
+    /// Bound in degrees of the rotation's error in 68 % of cases.
     pub sigma_deg: f64,
 }

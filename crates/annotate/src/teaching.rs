@@ -16,27 +16,27 @@ use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, Tea
 /// Maximum number of points of the loss curve on the page; a longer run keeps every second, fourth … point.
 const MAX_POINTS: usize = 240;
 
-/// State of a teaching.
+/// State of a teaching run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// No teaching was started yet.
+    /// No teaching run was started yet.
     #[default]
     Idle,
-    /// The teaching is running.
+    /// A teaching run is in progress.
     Running,
-    /// A running teaching was asked to end with its current result.
+    /// A teaching run in progress was asked to end with its current result.
     Stopping,
-    /// The teaching has ended with a model.
+    /// The teaching run has ended with a model.
     Done,
-    /// The teaching failed; there is no model.
+    /// The teaching run failed; there is no model.
     Failed,
 }
 
-/// State and progress of a teaching, as the page shows it.
+/// State and progress of a teaching run, as the page shows it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct News {
-    /// State of the teaching.
+    /// State of the teaching run.
     pub status: Status,
     /// The model being taught.
     pub model: Option<ModelKind>,
@@ -48,7 +48,7 @@ pub struct News {
     pub planned: usize,
     /// Seconds since the start.
     pub elapsed_secs: f64,
-    /// Estimated remaining seconds at the pace so far. `None` if unknown: before the first step, if another network
+    /// Estimated remaining seconds at the pace so far. `None` if unknown: before the second step, if another network
     /// follows, and after the last step, while the model is tested.
     pub left_secs: Option<f64>,
     /// `[step, loss]`, thinned.
@@ -79,7 +79,7 @@ impl Pace {
     }
 }
 
-/// The teaching of a session; one at a time.
+/// The teaching runs of a session; one at a time.
 #[derive(Default)]
 pub struct Teaching {
     news: Mutex<News>,
@@ -92,7 +92,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Teaching {
-    /// State of the teaching.
+    /// State of the teaching run.
     pub fn news(&self) -> News {
         locked(&self.news).clone()
     }
@@ -105,7 +105,7 @@ impl Teaching {
         locked(&self.model).clone().ok_or(Error::NotTaught)
     }
 
-    /// Asks a running teaching to end with its current result.
+    /// Asks a teaching run in progress to end with its current result.
     pub fn stop(&self) {
         let mut news = locked(&self.news);
         if news.status == Status::Running {
@@ -139,16 +139,18 @@ impl Teaching {
         }
         if self.stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
+    /// Checks that no teaching run is in progress.
+    ///
     /// # Errors
-    /// [`Error::Busy`] while a teaching is running.
+    /// [`Error::Busy`] while a teaching run is in progress.
     pub fn check_idle(&self) -> Result<()> {
         idle(&locked(&self.news))
     }
 
-    /// Starts a teaching on a thread; `keep` writes the model and returns its path. `news` gives the progress.
+    /// Starts a teaching run on a thread; `keep` writes the model and returns its path. `news` gives the progress.
     ///
     /// # Errors
-    /// [`Error::Busy`] while a teaching is running.
+    /// [`Error::Busy`] while a teaching run is in progress.
     pub fn start(
         self: &Arc<Self>,
         teacher: Arc<dyn GraspTeacher>,
@@ -194,7 +196,7 @@ impl Teaching {
         Ok(begun)
     }
 
-    /// Sets the model for the pictures to try.
+    /// Sets the model that [`Self::model`] returns, such as one read from a file.
     pub fn set_model(&self, model: Arc<dyn TaughtModel>) {
         *locked(&self.model) = Some(model);
     }

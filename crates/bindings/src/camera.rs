@@ -18,7 +18,7 @@ impl Camera {
     /// Reads a camera file: ROS camera_info YAML, with `table:` for the camera's pose.
     ///
     /// # Errors
-    /// The file cannot be read, or has no pose of the camera.
+    /// The file cannot be read, is not a camera file, or has no pose of the camera.
     pub fn read(path: &Path) -> Result<Self> {
         let read = || {
             let (camera, _) = camera_files::read(path)?;
@@ -31,7 +31,7 @@ impl Camera {
     /// Reads a camera from the text of a file.
     ///
     /// # Errors
-    /// The errors of [`Self::read`].
+    /// The text is not a camera file, or has no pose of the camera.
     pub fn from_yaml(text: &str) -> Result<Self> {
         let read = || {
             let camera = CalibratedCamera::from_yaml(text)?;

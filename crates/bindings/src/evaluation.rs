@@ -14,7 +14,8 @@ use crate::threads::on_threads;
 /// returns the figures as JSON.
 ///
 /// # Errors
-/// Labels cannot be read or belong to other pictures, detection fails, or the page cannot be written.
+/// `min_score` is outside 0 to 1, labels cannot be read or belong to other pictures, detection fails, or the page
+/// cannot be written.
 pub fn evaluate(
     model: &Model,
     folder: &Path,

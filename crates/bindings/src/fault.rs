@@ -23,7 +23,7 @@ pub enum FaultKind {
     ModelFile = 3,
     /// An invalid picture or array.
     Picture = 4,
-    /// An invalid camera file, a camera without a pose, or a model without lengths.
+    /// An invalid camera file, a camera without a pose, or a model taught without a calibrated camera.
     Camera = 5,
     /// A region that cannot be searched.
     Region = 6,
@@ -46,7 +46,7 @@ pub enum FaultKind {
 pub struct Fault {
     /// The kind of error.
     pub kind: FaultKind,
-    /// The expected and the found value.
+    /// The whole message.
     pub text: String,
 }
 

@@ -110,8 +110,9 @@ impl Model {
     /// Detects the part in a picture.
     ///
     /// # Errors
-    /// The picture's size differs from the camera's, the region is not inside it, or a camera is given to a model that
-    /// was taught without one.
+    /// The errors of [`Self::perception`]; the picture's size differs from the camera's, or the region is not inside
+    /// it; the number of threads is invalid, or the system refuses them; the process was forked from one with threads
+    /// of this library.
     pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
         on_threads(view.threads, || {
             let perception = self.perception(view.camera.as_ref(), view.region)?;
@@ -128,7 +129,8 @@ impl Model {
     /// The model's perception with a camera, or for pictures of any camera.
     ///
     /// # Errors
-    /// The errors of [`Self::detect`].
+    /// The region is empty, lies outside the camera's pictures, or is too small for the part; or a camera is given that
+    /// does not see the plane of the marks, or to a model that was taught without one.
     pub fn perception(&self, camera: Option<&Camera>, region: RegionChoice) -> Result<Arc<Perception>> {
         let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {

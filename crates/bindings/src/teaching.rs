@@ -22,7 +22,7 @@ pub struct CameraTeaching {
     pub grasp_height_m: f64,
 }
 
-/// The inputs of a teaching.
+/// The inputs of a teaching run.
 #[derive(Debug, Clone)]
 pub struct Teaching {
     /// Photo and marks of each demonstration.
@@ -33,11 +33,11 @@ pub struct Teaching {
     pub camera: Option<CameraTeaching>,
 }
 
-/// Teaches like `sdg teach`; `observe` may end the teaching early. The model is the one that a file contains, with
+/// Teaches like `sdg teach`; `observe` may end teaching early. The model is the one that a file contains, with
 /// rounded weights.
 ///
 /// # Errors
-/// Files cannot be read, photos or marks are unsuitable for teaching, or the teaching was ended before there was a model.
+/// Files cannot be read, photos or marks are unsuitable for teaching, or teaching was ended before there was a model.
 pub fn teach(
     from: &Teaching,
     mut options: TeachOptions,

@@ -34,7 +34,8 @@ impl Tracker {
     /// later, identically on every machine; otherwise as soon as the search has ended.
     ///
     /// # Errors
-    /// The errors of [`Model::detect`]; the system refuses a thread.
+    /// The errors of [`Model::perception`]; the system refuses a thread; the process was forked from one with threads
+    /// of this library.
     pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
         check_process()?;
         let perception = model.perception(view.camera.as_ref(), view.region)?;

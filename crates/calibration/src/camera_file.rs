@@ -197,7 +197,8 @@ impl CalibratedCamera {
         }
     }
 
-    /// Whether both are equal except for rounding of the quaternions, which are normalised on reading.
+    /// Whether name, lens and both poses are equal, except for rounding of the quaternions, which are normalised on
+    /// reading. The other values of the table are not compared.
     fn is_near(&self, other: &Self) -> bool {
         let poses =
             |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];
@@ -240,7 +241,7 @@ impl CalibratedCamera {
         SECTIONS.into_iter().zip(texts).filter_map(|(name, text)| Some((name, text?))).collect()
     }
 
-    /// The camera in its frame, and the frame with the table.
+    /// The camera in the table's frame, and the table's pose.
     ///
     /// # Errors
     /// [`CameraFileError::NoPose`] if the file has none.

@@ -11,7 +11,7 @@
 //! there is none (stale, torn, gone), it is a [`CameraError::Fault`], and the next call tries again.
 //!
 //! Not in this crate: lenses and tables (crate `calibration`), the simulated camera (crate `simulation`, which opens
-//! [`Address::Sim`]), TLS, sound, and video codecs other than motion JPEG.
+//! [`Address::Sim`]), topics of ROS 2 (crate `ros2`), TLS, sound, and video codecs other than motion JPEG.
 //!
 //! ```
 //! use sdg_camera::{Address, OpenOptions, open};

@@ -35,6 +35,7 @@ const SCRIPT: &str = include_str!("page/page.js");
 /// | path | answer |
 /// |---|---|
 /// | `/` | a page with the live picture, which also shows that the program has ended |
+/// | `/page.js` | the page's script |
 /// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
 /// | `/snapshot.jpg` | the newest picture; status 503 before the first |
 /// | `/words` | the description of the newest picture; empty before the first |

@@ -6,7 +6,7 @@ use image::RgbImage;
 /// the default of the USB video class. Integer arithmetic, with an error of at most one step.
 ///
 /// # Errors
-/// Text with the number of bytes found, if the rows need more.
+/// Text for a width that is odd or zero, or with the number of bytes found if the rows need more.
 pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     if width == 0 || width % 2 == 1 {
         return Err(format!("an odd width of {width} pixels"));
@@ -31,7 +31,7 @@ pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) 
 /// Converts rows of RGB24, which may be padded.
 ///
 /// # Errors
-/// The errors of [`yuyv_to_rgb`].
+/// Text with the number of bytes found, if the rows need more.
 pub(crate) fn rgb24_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     let rows = rows(bytes, width as usize * 3, height, bytes_per_row)?;
     let pixels = rows.flatten().copied().collect();

@@ -156,7 +156,7 @@ typedef struct {
     uint32_t region[4];
 } sdg_options;
 
-/* Inputs of a teaching. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`. */
+/* Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`. */
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;

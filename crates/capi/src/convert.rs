@@ -75,7 +75,7 @@ const DEFAULT_SEED: u64 = 1;
 /// Maximum number of training steps.
 const MAX_STEPS: u64 = 1_000_000;
 
-/// The inputs and options of a teaching.
+/// The inputs and options of a teaching run.
 ///
 /// # Safety
 /// The pointers are null or zero-terminated strings.

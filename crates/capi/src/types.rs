@@ -118,7 +118,7 @@ pub struct sdg_options {
     pub region: [u32; 4],
 }
 
-/// Inputs of a teaching. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`.
+/// Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sdg_teaching {

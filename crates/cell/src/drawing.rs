@@ -21,8 +21,8 @@ pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbIm
 }
 
 /// Draws detections, which are ordered by decreasing score. Those with at least `min_score` are drawn as accepted. If
-/// reasons are given, a refused detection with a reason gets a tag with score and reason, which no other tag covers;
-/// the other refused ones get only a box.
+/// reasons are given, a refused detection with a reason gets a box and a tag with score and reason, which no other such
+/// tag covers if there is room; the other refused ones get only a box.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,

@@ -24,7 +24,8 @@ impl DryRun {
     /// Plans the sequence from a state of the arm. The part's pose is given if the part is visible from there.
     ///
     /// # Errors
-    /// A motion violates a limit, or the arm cannot apply a setting.
+    /// A setting of the sequence is invalid, or the place has no room for the part. A motion that violates a limit is
+    /// not an error, but is returned in [`Self::failed`].
     pub fn plan(
         start: ArmState,
         opening_m: f64,

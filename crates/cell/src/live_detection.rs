@@ -50,7 +50,7 @@ impl Frames {
         matches!(self, Self::Each(camera) if camera.is_on_request())
     }
 
-    /// The next frame, after a short wait.
+    /// The next frame. For the newest frame of a stream, it waits 0.2 s at most.
     pub fn take(&mut self) -> Next {
         match self {
             Self::Newest(newest) => match newest.take(MAX_WAIT) {
@@ -73,7 +73,7 @@ impl Frames {
 pub struct Part {
     /// The detection.
     pub found: Found,
-    /// Number and state of the track, and the time since the part was last visible.
+    /// Number and state of the track, and the time since the part was first found.
     pub track: Option<(u64, TrackState, Duration)>,
 }
 
@@ -106,7 +106,7 @@ impl FrameDetector {
     /// true if frames are produced only on request.
     ///
     /// # Errors
-    /// The model cannot be tracked.
+    /// The operating system provides no thread.
     pub fn new(
         detector: Perception,
         verification: Verification,

@@ -54,7 +54,7 @@ enum Searches {
 }
 
 impl LiveTracker {
-    /// Creates a tracker without known parts, and starts the search thread.
+    /// Creates a tracker without known parts. [`SearchTime::AsItTakes`] also starts the search thread.
     ///
     /// # Errors
     /// The operating system provides no thread.
@@ -80,10 +80,10 @@ impl LiveTracker {
     }
 
     /// Tracks all known parts into a frame. A frame that does not continue the previous one is searched first;
-    /// otherwise due searches run on the other thread. `captured` is measured from any fixed time.
+    /// otherwise due searches run as [`SearchTime`] defines. `captured` is measured from any fixed time.
     ///
     /// # Errors
-    /// Errors of a search, for example a picture that is too small.
+    /// Errors of a search, for example a picture that is too small; or the search thread has ended.
     pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Result<Vec<TrackedPart>> {
         if let Some(outcome) = self.searches.finished()? {
             self.tracker.take_outcome(outcome)?;

@@ -61,7 +61,8 @@ impl Perception {
     /// pose.
     ///
     /// # Errors
-    /// The model was taught without a camera, or the camera does not see the plane of the marks.
+    /// The model was taught without a camera, the camera does not see the plane of the marks, or the model's region is
+    /// not inside the camera's pictures.
     pub fn over_table(model: GraspModel, place: &CameraOverTable) -> Result<Self> {
         Ok(Self { view: View::OverTable(Box::new(PlanViewDetector::new(model, place)?), *place), frame: None })
     }
@@ -190,7 +191,7 @@ impl Perception {
         self.frame
     }
 
-    /// The model; its size is known if the camera's pose is known.
+    /// The model. If the camera's pose is known, its parts have a known size.
     pub fn model(&self) -> &GraspModel {
         match &self.view {
             View::AnyCamera(model) => model,

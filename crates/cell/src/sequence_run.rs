@@ -11,7 +11,7 @@ pub struct Ended {
     pub grasp: GraspReport,
     /// The step that failed, and the reason; `None` if all steps succeeded.
     pub failed: Option<(GraspStep, String)>,
-    /// Offset of the placed part from its place, measured in the last picture; `None` if no place was given.
+    /// Offset of the placed part from its place, measured in the last picture; `None` without a place or a measurement.
     pub beside: Option<PlaceOffset>,
     /// The contact at each placing.
     pub touched: Vec<Touched>,
@@ -20,7 +20,7 @@ pub struct Ended {
 /// Grasps the part and, if a place is given, puts it there.
 ///
 /// # Errors
-/// The errors of [`sdg_robot::grasp`].
+/// The errors of [`sdg_robot::grasp`] or, with a place, of [`sdg_robot::grasp_and_place`].
 pub fn run_sequence<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,

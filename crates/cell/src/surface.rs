@@ -3,7 +3,7 @@
 //! ```text
 //! outline of the part ─ windows around it, the nearest first, without those that the part hides from a camera
 //! window ─ at each height: both pictures resampled there ─ correlation ─ the height of the only clear maximum
-//! heights of the windows ─ the highest that many windows on all sides have in common ─ SurfaceHeight
+//! heights of the windows ─ the highest that enough windows around the part have in common ─ SurfaceHeight
 //! ```
 //! The part's own edges are anywhere between its bottom and its top, and the edges that match between two pictures
 //! depend on the view. The surface beside it is a single plane, together with the grain, scratches, shadows and edges

@@ -1,4 +1,4 @@
-//! Progress of a teaching on standard error: a bar on a terminal, plain lines otherwise.
+//! Progress of teaching on standard error: a bar on a terminal, plain lines otherwise.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;

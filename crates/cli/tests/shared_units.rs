@@ -183,7 +183,7 @@ fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
     let error = refused(&without_mujoco(&[TEACH, LOOK, GRASP]), 1, &["MuJoCo could not be loaded", "libmujoco2.2.2"]);
     assert_eq!(error.lines().count(), 1, "{error}");
     assert!(!Path::new(&out).exists());
-    // Teachings do not need the simulator.
+    // Teaching does not need the simulator.
     assert_eq!(json(&without_mujoco(&[TEACH]))["units"][0]["ended"], "done");
 }
 

@@ -1,4 +1,4 @@
-//! Shell completions, manual pages, and the page of a teaching.
+//! Shell completions, manual pages, and the page of a teaching run.
 
 use std::fs;
 use std::io::Write;

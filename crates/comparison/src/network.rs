@@ -19,7 +19,8 @@ const SQUARE_EPSILON: f32 = 1e-4;
 pub struct ComparisonNetwork {
     /// Computes the map of a square of the demonstration or of the picture; the same weights for both.
     pub trunk: Vec<Stage>,
-    /// Computes the last map from the differences.
+    /// Computes the last map from the compared features: cosines, feature differences, the demonstration's features and
+    /// the views' differences.
     pub stages: Vec<Stage>,
     /// Fully connected layer, from the flattened last map to the hidden units.
     pub hidden: Linear,
@@ -76,16 +77,16 @@ impl ComparisonNetwork {
     /// The log-odds that each view shows the part in the view's pose, `[N, 1]`.
     ///
     /// # Panics
-    /// Without a view, or with views of another network's references.
+    /// Without a view, or with views of another size than this network's.
     pub fn forward(&self, views: &[View]) -> Tensor<2> {
         let maps = self.maps(views);
         self.log_odds(&maps)
     }
 
-    /// The log-odds of each view and the correction of its pose.
+    /// The log-odds of each view and the correction of its pose; empty without a view.
     ///
     /// # Panics
-    /// With views of another network's references.
+    /// With views of another size than this network's.
     pub async fn compare(&self, views: &[View]) -> Vec<Comparison> {
         if views.is_empty() {
             return Vec::new();
@@ -102,7 +103,8 @@ impl ComparisonNetwork {
     }
 
     /// The correction of the pose of each view. The views may be finer than those on which the log-odds are learnt
-    /// ([`ComparisonConfig::finer`]), since the features are computed in the same way at every position.
+    /// ([`ComparisonConfig::finer`]), since the features are computed in the same way at every position. Empty without
+    /// views.
     ///
     /// # Panics
     /// With views of several sizes.

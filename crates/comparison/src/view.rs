@@ -168,8 +168,10 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
+    /// Stacks the views' values.
+    ///
     /// # Panics
-    /// Without a view, or with views of several networks.
+    /// Without a view, or with views of several sizes.
     pub(crate) fn new(views: &[View], device: &Device) -> Self {
         let mut demonstrations: Vec<&Arc<[f32]>> = Vec::new();
         let demonstration_of_view: Vec<i32> = views

@@ -1,8 +1,8 @@
 //! The configuration of a detector: every setting in which R-CNN implementations differ.
 //!
-//! This module computes nothing. Each enum names a choice that a bare bool or number would hide; the two values of most
-//! choices are Detectron2's and torchvision's. A configuration is plain data that can be serialised, so a model file
-//! can contain the configuration of its training.
+//! This module computes only sizes. Each enum names a choice that a bare bool or number would hide; the two values of
+//! most choices are Detectron2's and torchvision's. A configuration is plain data that can be serialised, so a model
+//! file can contain the configuration of its training.
 
 mod mask_head;
 mod roi_pooler;
@@ -284,7 +284,7 @@ pub struct RpnConfig {
     pub matcher: MatcherConfig,
     /// Number of anchors in the loss.
     pub sampler: SamplerConfig,
-    /// Weights of the deltas from anchors, or from proposals, to boxes.
+    /// Weights of the deltas from anchors to boxes.
     pub box_coder: BoxCoderConfig,
     /// Best anchors kept on each level before NMS.
     pub pre_nms_top_n: PerMode,
@@ -354,7 +354,7 @@ pub struct BoxHeadConfig {
     pub background: BackgroundClass,
     /// Whether each class has its own deltas.
     pub box_deltas: BoxDeltas,
-    /// Weights of the deltas from anchors, or from proposals, to boxes.
+    /// Weights of the deltas from proposals to boxes.
     pub box_coder: BoxCoderConfig,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,

@@ -90,7 +90,7 @@ impl RcnnConfig {
     /// Builds the detector on `device` without initial values, for a caller that then sets all parameters.
     ///
     /// # Errors
-    /// A configuration that contradicts itself.
+    /// The errors of [`RcnnConfig::validate`].
     pub fn init_blank(&self, device: &Device) -> Result<GeneralizedRcnn> {
         self.build(Initializer::blank(device))
     }
@@ -146,7 +146,7 @@ impl GeneralizedRcnn {
     /// are allowed: they teach the background.
     ///
     /// # Errors
-    /// Different numbers of images and targets, or a target that contradicts the configuration.
+    /// No images, different numbers of images and targets, or a target that contradicts the configuration.
     pub fn losses(&self, images: &[TransformedImage], targets: &[Target], seed: u64) -> Result<Losses> {
         let targets = self.resized_targets(images, targets)?;
         Ok(self.losses_of_resized(images, &targets, seed))

@@ -138,7 +138,7 @@ impl Imprint {
     /// empty.
     ///
     /// # Errors
-    /// Targets that do not fit the images.
+    /// No images, or targets that do not fit them.
     pub fn last_layers(
         &self,
         detector: &GeneralizedRcnn,

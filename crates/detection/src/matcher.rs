@@ -17,8 +17,8 @@ pub enum Match {
 /// Matches every candidate to the ground-truth box with the largest overlap.
 ///
 /// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the candidates with the
-/// largest overlap with a ground-truth box are positive at any IoU; each of them is then matched to the box that it
-/// overlaps most, which may be a different one (Detectron2 and torchvision do the same).
+/// largest overlap with a ground-truth box are positive at any IoU above 0; each of them is then matched to the box
+/// that it overlaps most, which may be a different one (Detectron2 and torchvision do the same).
 pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &MatcherConfig) -> Vec<Match> {
     if gt_boxes.is_empty() {
         return vec![Match::Negative; candidates.len()];

@@ -11,8 +11,9 @@ pub use edge::{edge, edge_of};
 pub use torchvision::r50_torchvision;
 
 const UNIT_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [1.0, 1.0, 1.0, 1.0] };
-/// Mean and standard deviation of the colours of ImageNet, red first, in [0, 1].
+/// Mean of the colours of ImageNet, red first, in [0, 1].
 const IMAGENET_MEAN: [f32; 3] = [0.485, 0.456, 0.406];
+/// Standard deviation of the colours of ImageNet, red first, for colours in [0, 1].
 const IMAGENET_STD: [f32; 3] = [0.229, 0.224, 0.225];
 const ROI_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [10.0, 10.0, 5.0, 5.0] };
 

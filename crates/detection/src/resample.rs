@@ -1,4 +1,4 @@
-//! Two resizing methods, each equal or nearly equal to a reference implementation, bit for bit.
+//! Two resizing methods, each with the same or nearly the same results as a reference implementation.
 
 use image::RgbImage;
 

@@ -27,7 +27,7 @@ pub struct ResizedTarget {
     pub boxes: Vec<Corners>,
     /// Class of each box.
     pub labels: Vec<usize>,
-    /// Keypoints of each box; empty if the detector has no keypoint head.
+    /// Keypoints of each box; may be empty if the detector has no keypoint head.
     pub keypoints: Vec<Vec<Keypoint>>,
     /// Mask of each box; empty if the detector has no mask head.
     pub masks: Vec<ObjectMask>,

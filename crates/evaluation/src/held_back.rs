@@ -18,7 +18,7 @@ use crate::statistics::{Share, wilson_interval};
 
 /// Index of the first held-out sample, far beyond the samples for validation and calibration.
 const FIRST: u64 = 1 << 40;
-/// Number of samples, three quarters of which contain the part. Chosen for time: a sample takes 0.15 s on one core.
+/// Number of samples, three quarters of which contain the part. Chosen to save time: a sample takes 0.15 s on one core.
 const COUNT: u64 = 24;
 /// Maximum size of a sample, in pixels. Larger samples take longer without more information: the part has a few hundred
 /// pixels in any case.
@@ -26,7 +26,7 @@ const MAX_PIXELS: f64 = 640.0 * 480.0;
 /// Range of sample sizes for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 
-/// The held-out samples of a teaching.
+/// The held-out samples of a teaching run.
 pub struct HeldBackSamples(Augmenter);
 
 impl HeldBackSamples {

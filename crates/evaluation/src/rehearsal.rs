@@ -133,7 +133,7 @@ impl Rehearsed {
 /// Number of pictures that were searched in an attempt, until the part was found or no further camera pose remained.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Looks {
-    /// Pictures from the look-out pose and near it.
+    /// Pictures from look-out poses.
     pub from_afar: usize,
     /// Pictures from above the detected part.
     pub from_above: usize,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Two-sided 95 % quantile of the normal distribution.
+/// Number of standard deviations on both sides of the mean that contain 95 % of a normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
 /// A fraction: `count` of `of`.

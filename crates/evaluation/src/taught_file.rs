@@ -9,7 +9,7 @@ use sdg_grasp::{GraspError, GraspModel, Taught, TeachOptions, TeachingEvent, tea
 
 use crate::held_back::HeldBackFigures;
 
-/// The result of a teaching.
+/// The result of a teaching run.
 pub struct TaughtFile {
     /// The model in memory and its history.
     pub taught: Taught,
@@ -20,7 +20,7 @@ pub struct TaughtFile {
 }
 
 impl TaughtFile {
-    /// Teaches a model; `observe` may end the teaching early.
+    /// Teaches a model; `observe` may end teaching early.
     ///
     /// # Errors
     /// The errors of [`teach`].

@@ -1,4 +1,4 @@
-//! Texts about a teaching.
+//! Texts about a teaching run.
 
 use sdg_demonstration::Demonstration;
 use sdg_grasp::{Ending, GraspModel, Taught};

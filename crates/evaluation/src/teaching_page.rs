@@ -1,4 +1,4 @@
-//! The page of a teaching: demonstrations, samples, losses and validation.
+//! The page of a teaching run: demonstrations, samples, losses and validation.
 
 use anyhow::Result;
 use image::RgbImage;

@@ -6,7 +6,7 @@ use nalgebra::Point2;
 const MIN_CROSS: f64 = 1e-12;
 
 /// The convex hull of points (Andrew's monotone chain): counter-clockwise where y points up, without points on its
-/// edges. Fewer than three different points are returned unchanged.
+/// edges. Fewer than three different points are returned sorted, each once.
 pub fn convex_hull(points: impl IntoIterator<Item = Point2<f64>>) -> Vec<Point2<f64>> {
     let mut points: Vec<Point2<f64>> = points.into_iter().collect();
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));

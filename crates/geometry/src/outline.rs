@@ -11,7 +11,8 @@ const MAX_VERTICES: usize = 56;
 /// Initial maximum distance of the simplified outline from the traced one, in pixels.
 const MIN_TOLERANCE_PX: f64 = 0.35;
 
-/// The outer outline of the largest piece of a mask, without holes; `None` for an empty mask.
+/// The outer outline of the largest piece of a mask, without holes; `None` for an empty mask, and if that outline
+/// consists of fewer than 12 edges of pixels.
 ///
 /// It has at most 56 vertices.
 ///
@@ -29,8 +30,8 @@ pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
     }
 }
 
-/// Follows the pixels' edges with the mask on the right-hand side, once around each boundary; the longest
-/// boundary is the outer outline of the largest piece.
+/// Follows the pixels' edges with the mask on the right-hand side, once around each boundary; the boundary of the
+/// largest area is the outer outline of the largest piece.
 fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     let (width, height) = (mask.width() as i64, mask.height() as i64);
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width && y < height && mask.get(x as u32, y as u32);

@@ -52,6 +52,8 @@ impl CheckConfig {
         max_detections: Self::DEFAULT_MAX_DETECTIONS,
     };
 
+    /// Checks the score and the size tolerance.
+    ///
     /// # Errors
     /// [`GraspError::InvalidConfig`] for a value of `score` or a size tolerance out of range; the rest of `search` is
     /// checked when a search is made from it.

@@ -147,7 +147,7 @@ pub enum GraspError {
         /// The first parameter that does not fit.
         found: String,
     },
-    /// Invalid input of the orientation CNN, or one that did not learn.
+    /// Invalid input or configuration of the orientation CNN.
     #[error(transparent)]
     Orientation(#[from] sdg_orientation::OrientationError),
     /// Error of the comparison network.

@@ -25,6 +25,8 @@ pub struct Lengths {
 }
 
 impl Lengths {
+    /// Checks that the values are possible.
+    ///
     /// # Errors
     /// [`GraspError::Damaged`] for impossible values.
     pub(crate) fn check(&self) -> Result<()> {

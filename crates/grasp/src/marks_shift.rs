@@ -28,9 +28,9 @@ const MIN_LINE_SHARE: f64 = 0.2;
 const HEIGHT_SHARES: (f64, f64) = (-0.04, 0.18);
 /// Search range across the line, and along it if the part is near the picture's centre; in diagonals.
 const MAX_ASIDE: f64 = 0.04;
-/// First step of the search, in diagonals. Chosen for time.
+/// First step of the search, in diagonals. Chosen to save time.
 const STEP: f64 = 0.01;
-/// Last step of the search, in diagonals. Chosen for time.
+/// Last step of the search, in diagonals. Chosen to save time.
 const LAST_STEP: f64 = 0.0025;
 /// Penalty per diagonal of shift along the line, in agreement of edges and surface together, in `[0, 2]`. Fitted like
 /// the next two (see above); half and double the values change the count by at most 3.

@@ -186,7 +186,7 @@ impl GraspModel {
     /// refused detections and the reasons; see [`GraspDetection::is_accepted`].
     ///
     /// # Errors
-    /// An image that is too small.
+    /// An image that is too small, or that does not fit the model's region.
     pub fn detect(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
         read_sync(self.detect_async(image, verification))
     }

@@ -315,7 +315,7 @@ fn to_json<T: Serialize>(value: &T) -> String {
 /// The metadata of a file, from the header alone.
 ///
 /// # Errors
-/// As for [`GraspModel::from_bytes`].
+/// A header that is not one of a model file.
 pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
     let metadata = read_metadata(bytes)?;
     Ok(ModelSummary {

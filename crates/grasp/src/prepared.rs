@@ -20,7 +20,7 @@ use crate::round_top::RoundTop;
 use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 
-/// Maximum extent of a part at the working resolution, in pixels. Chosen for time: the resulting error is at most a
+/// Maximum extent of a part at the working resolution, in pixels. Chosen to save time: the resulting error is at most a
 /// fraction of a pixel.
 const MAX_EXTENT_PX: f64 = 256.0;
 /// Largest enlargement of a cut-out; a picture that would need more is halved instead. Chosen by hand, not measured.

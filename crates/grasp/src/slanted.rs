@@ -16,9 +16,9 @@ use crate::detection::{Found, GraspDetection};
 use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
-/// Maximum number of places used, best first. Chosen by hand, for time.
+/// Maximum number of places used, best first. Chosen by hand to save time.
 const NUM_SLANT_PLACES: usize = 4;
-/// Minimum agreement of these places. Chosen by hand, for time.
+/// Minimum agreement of these places. Chosen by hand to save time.
 const MIN_AGREEMENT: f64 = 0.25;
 /// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
@@ -27,7 +27,7 @@ const SHORTENING_NOISE: f64 = 0.12;
 /// Minimum tilt in radians: a smaller one shortens by less than 3 % and is ignored.
 const MIN_TILT: f64 = 0.24;
 /// Minimum fraction of the shortening, relative to a level camera, that a slant must explain: less is noise of the
-/// fits. Chosen by hand, for time; the agreement of the places decides.
+/// fits. Chosen by hand to save time; the agreement of the places decides.
 const MIN_EXPLAINED: f64 = 0.1;
 /// Minimum gain of agreement over the level view, of a slanted place and then of the picture. For places seen by a
 /// camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned sets).

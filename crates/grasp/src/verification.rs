@@ -171,7 +171,7 @@ impl PlacedDemonstration<'_> {
 const END_MARGIN_LOG: f64 = 0.02;
 /// Gain of agreement beyond the end that shows this. Chosen by hand.
 const MIN_GAIN_BEYOND_END: f64 = 0.05;
-/// Minimum agreement for a search of the marks; poses below it are refused. Chosen by hand, for time.
+/// Minimum agreement for a search of the marks; poses below it are refused. Chosen by hand to save time.
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {

@@ -14,7 +14,7 @@ pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
 pub const DATA_YAML: &str = "data.yaml";
 /// Other common names, which are tried after [`DATA_YAML`] in each folder.
 const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
-/// Maximum number of folders between a label file and its data.yaml, as in labels/train/a.txt.
+/// Number of folders in which data.yaml is searched, from the label file's folder upwards, as in labels/train/a.txt.
 const MAX_PARENT_FOLDERS: usize = 3;
 
 /// An annotation file and the files that belong to it.
@@ -138,7 +138,8 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     }
 }
 
-/// Writes the labels beside the output and returns the path of their file. An existing data.yaml is kept.
+/// Writes the labels beside the output and returns the path of their file; `None` if the format has no such file. An
+/// existing data.yaml is kept.
 ///
 /// # Errors
 /// An existing file contradicts the labels, or files cannot be read or written.

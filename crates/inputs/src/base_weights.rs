@@ -19,7 +19,7 @@ pub type Origin = BTreeMap<String, String>;
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
 /// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and how
-/// they were made; `None` if the file is of another kind.
+/// they were made; `None` if the file is of another kind, or the taught model has no network.
 ///
 /// # Errors
 /// The file cannot be read, the weights are of another preset, or a named part does not exist.
@@ -54,7 +54,7 @@ pub fn read_own(
 /// Opens a checkpoint of any format.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read, or is not a checkpoint.
 pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     let named = || path.display().to_string();
     let mut source = Source::open(path).with_context(named)?;

@@ -34,7 +34,7 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
 /// for an image.
 ///
 /// # Errors
-/// Files cannot be read, the checkpoint is incomplete, or the outputs have other shapes.
+/// Files cannot be read, the checkpoint is incomplete, or the targets among the outputs do not fit each other.
 pub fn verify_checkpoint(
     file: &Path,
     config: Option<RcnnConfig>,

@@ -31,7 +31,7 @@ pub fn read_sensor_pixels_if_turned(photo: &Path) -> Result<Option<RgbImage>> {
 /// of such marks would be unknown.
 ///
 /// # Errors
-/// The photo is rotated.
+/// The photo is rotated, or its file cannot be read.
 pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     if is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?) {
         bail!(

@@ -27,6 +27,7 @@ impl TeachingFiles<'_> {
     /// part and the lengths to the options, and sets the size of pictures for a region in the options to that of the
     /// first photo.
     ///
+    /// # Errors
     /// Files cannot be read; with a camera: a photo is rotated by an Exif orientation, has a different size, or has
     /// marks that are outside the visible part of the plane; the region is not inside the first photo.
     pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {

@@ -3,13 +3,14 @@
 //! burn's CPU backend `Flex` runs a convolution forwards at a moderate speed and backwards through a generic fallback,
 //! and it has no ROIAlign. This crate adds both, and the other operations that took most of the training time: 3×3
 //! convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps in place, group
-//! norm, max pooling, doubling, and non-maximum suppression.
+//! norm, max pooling, upsampling, log-softmax, cosines between maps, AdamW's update, and non-maximum suppression.
 //!
 //! ```text
 //! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`
 //!   └─ KernelBackend::kernel_conv2d       the backend extension: one method per operation
 //!        ├─ Flex                          hand-written kernel on f32 slices
 //!        ├─ Autodiff<Flex>                the same, with a hand-written backward
+//!        ├─ Cube                          ROIAlign on wgpu and CUDA; otherwise the default body
 //!        └─ any other backend             the default body: burn's own tensor operations
 //! ```
 //!
@@ -18,7 +19,7 @@
 //! float type takes the composed default. Results are bit-identical for any number of threads.
 //!
 //! Deliberately not included: groups and dilation (no detector here has them), gradients with respect
-//! to ROI coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.
+//! to ROI coordinates (the R-CNN family treats proposals as constants), and GPU kernels other than ROIAlign's.
 //!
 //! ```
 //! use burn::tensor::{Device, Tensor};

@@ -120,6 +120,8 @@ lanes_kernel! {
     unsafe fn panel(product: &PanelProduct<'_>, output: *mut f32) = panel_lanes
 }
 
+/// Computes one panel of the product.
+///
 /// # Safety
 /// As asserted by [`PanelProduct::run`].
 #[inline(always)]
@@ -293,6 +295,8 @@ unsafe fn finish<L: Lanes, const R: usize, const V: usize>(
     }
 }
 
+/// Loads sixteen floats, or the first `len` if the group is not `whole`.
+///
 /// # Safety
 /// Sixteen floats, or the first `len` of an incomplete group, are readable.
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! Height of the hand above the table.
+//! Height of hand, wrist and elbow above the table.
 
 use nalgebra::{Isometry3, Point3};
 

@@ -31,7 +31,7 @@ pub struct DhJoint {
 }
 
 /// The data of an arm with its hand for kinematics, collisions and dynamics. Another arm is another value of this type,
-/// see [`ArmGeometry::arm`] and [`ArmGeometry::fr3`].
+/// see [`ArmGeometry::panda`] and [`ArmGeometry::fr3`].
 ///
 /// An arm with fewer joints has the range from 0 to 0 for its last joints, whose columns of the Jacobian are zero.
 #[derive(Debug, Clone, PartialEq)]

@@ -161,8 +161,10 @@ impl ArmGeometry {
     /// # Units and frames
     /// `start` in rad, inside the limits; the end pose in m in the base frame.
     ///
-    /// # Errors [`KinematicsError::PathJointLimit`] if a joint would leave its range; [`KinematicsError::PathBlocked`]
-    /// at a singularity or if the arm is too short. Both contain the position along the path.
+    /// # Errors
+    /// [`KinematicsError::PathJointLimit`] if a joint would leave its range; [`KinematicsError::PathBlocked`] at a
+    /// singularity or if the arm is too short. Both contain the position along the path. Other errors are for invalid
+    /// input.
     pub fn straight_path(
         &self,
         start: &JointVector,
@@ -215,7 +217,7 @@ impl ArmGeometry {
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 /// A line shorter than this is no motion.
 const MIN_LENGTH_M: f64 = 1e-9;
-/// Minimum number of pieces: the five-point formula of the second derivative needs this many.
+/// Minimum number of pieces; the five-point formula of the second derivative needs at least four.
 const MIN_PIECES: usize = 8;
 const MAX_PIECES: usize = 100_000;
 const MAX_CORRECTIONS: usize = 8;

@@ -95,7 +95,7 @@ impl RoundedPath {
     /// corner: the distance of the corner's start and end from the waypoint, s at full speed.
     ///
     /// # Panics
-    /// If the numbers do not match, a size is not positive, or corners overlap.
+    /// If the numbers do not match, two successive waypoints are equal, a size is not positive, or corners overlap.
     pub fn new(waypoints: &[JointVector], corner_secs: &[f64]) -> Self {
         assert!(waypoints.len() >= 2 && corner_secs.len() == waypoints.len() - 2, "one corner for each inner waypoint");
         let mut pieces = Vec::with_capacity(2 * waypoints.len());

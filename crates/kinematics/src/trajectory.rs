@@ -69,7 +69,8 @@ impl Trajectory {
     /// The fastest straight motion in joint space from rest at `start` to rest at `end`.
     ///
     /// # Errors
-    /// [`KinematicsError::NotFinite`], or [`KinematicsError::JointOutOfRange`] for an end outside `limits`.
+    /// [`KinematicsError::NotFinite`]; [`KinematicsError::JointOutOfRange`] for a start or an end outside `limits`;
+    /// [`KinematicsError::Trajectory`] if the generator fails.
     pub fn point_to_point(
         start: &JointVector,
         end: &JointVector,
@@ -106,8 +107,8 @@ impl Trajectory {
     /// In rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
     ///
     /// # Errors
-    /// The errors of [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] if the arm cannot stop from
-    /// this state inside the position limits.
+    /// The errors of [`Trajectory::point_to_point`]; [`KinematicsError::JointOutOfRange`] also if the motion would
+    /// leave the position limits.
     pub fn from_motion(
         start: &JointVector,
         start_velocity: &JointVector,
@@ -192,8 +193,9 @@ impl Trajectory {
     /// the torques of an arm with its load.
     ///
     /// # Errors
-    /// [`KinematicsError::JointOutOfRange`] for an end outside the limits; [`KinematicsError::Trajectory`] if the
-    /// joints cannot hold the weight of arm and load somewhere on the path.
+    /// [`KinematicsError::NotFinite`]; [`KinematicsError::JointOutOfRange`] for a start or an end outside the limits;
+    /// [`KinematicsError::Trajectory`] if the joints cannot hold the weight of arm and load somewhere on the path, or
+    /// the arm cannot continue there within its limits.
     pub fn along_rounded_path(
         path: RoundedPath,
         limits: &JointLimits,

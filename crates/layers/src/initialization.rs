@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 /// Initialises the parameters of one model.
 #[derive(Debug)]
 pub struct Initializer {
-    /// `None` sets all values to zero.
+    /// `None` for zeros instead of random values.
     rng: Option<Pcg64Mcg>,
     device: Device,
 }

@@ -115,6 +115,8 @@ fn open(names: &[&str]) -> Result<Library, LibraryError> {
     Err(LibraryError::Missing { reason: reasons.join("; ") })
 }
 
+/// Looks up a symbol of the library.
+///
 /// # Safety
 /// `T` is the type of the symbol's address.
 unsafe fn symbol<'a, T>(library: &'a Library, name: &str) -> Result<libloading::Symbol<'a, T>, LibraryError> {

@@ -140,7 +140,7 @@ impl AnimationRecorder {
     ///
     /// # Errors
     /// [`ReportError::NoFrames`] if there is no frame, [`ReportError::PictureSize`] if a side exceeds GIF's limit of
-    /// 65535.
+    /// 65535, [`ReportError::Gif`] if the encoder rejects a frame.
     pub fn finish(mut self) -> Result<Animation, ReportError> {
         self.frames.extend(self.left_out.take());
         let Some(still) = self.frames.last().cloned() else {
@@ -169,7 +169,7 @@ struct Economy {
     num_colors: usize,
     /// Maximum difference of a channel in pixels that count as unchanged.
     tolerance: u8,
-    /// Every `stride`-th frame is kept.
+    /// Every `stride`-th frame is kept, and the last one.
     stride: usize,
     /// Scale factor of the sides.
     scale: f64,

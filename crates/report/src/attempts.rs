@@ -35,7 +35,7 @@ pub struct AttemptSummary {
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians at the bottom; `steps` are the names of the steps in order.
+/// The table of attempts, with medians at the bottom if there are several; `steps` are the names of the steps in order.
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
@@ -99,7 +99,7 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
 }
 
 /// Detections and outcomes: the rows are classes of the last detection's error, the columns are the steps (of `steps`)
-/// at which attempts ended.
+/// at which attempts failed, and "held".
 ///
 /// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]

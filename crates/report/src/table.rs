@@ -60,7 +60,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// A column of text.
+    /// Text.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())

@@ -5,8 +5,8 @@
 //! PartFinder ─► GraspTarget ─► grasp: plan ─► Robot::follow ─► SafetyLimits::check ─► CheckedMotion ─► Arm::follow
 //!                                                                                     Watch ◄─ ArmState ─┘
 //! ```
-//! [`Arm`] is implemented by [`FrankaArm`] and by the simulated workcell of the crate `simulation`. A motion reaches an
-//! arm only as a [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
+//! [`Arm`] is implemented by [`FrankaArm`], by [`PlannedArm`] for dry runs, and in the crates `simulation` and `ros2`.
+//! A motion reaches an arm only as a [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
 //!
 //! [`grasp_and_place`] continues to a [`PlaceGoal`]; [`Robot::plan_around`] finds paths around the obstacles of the
 //! cell.

@@ -13,7 +13,7 @@ const CAPSULES_STAND_OUT_M: f64 = 0.0055;
 /// capsules, plus the difference between the planner's margin (3 mm) and the room that fingers must have in a tray
 /// (1 mm).
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
-/// Minimum thickness assumed for a part, m.
+/// Minimum half width or radius of the solid that stands for a part, m.
 const MIN_HALF_M: f64 = 0.0005;
 /// Largest distance between two grasps of the same part, m.
 const SAME_WITHIN_M: f64 = 0.015;

@@ -87,7 +87,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// The straight motion in joint space to a configuration, as fast as `joints` and the tcp's limits allow.
     ///
     /// # Errors
-    /// [`RobotError::Planning`].
+    /// [`RobotError::Planning`], and the errors of [`Self::commanded`].
     pub fn plan_free(&mut self, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
         let start = self.commanded()?;
         self.slowed(|share| {
@@ -146,7 +146,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Checks a motion and follows it to its end.
     ///
     /// # Errors
-    /// [`RobotError::Unsafe`] before anything moves; later the error that ended the motion, after which nothing moves.
+    /// Before anything moves: [`RobotError::Latched`] or [`RobotError::Stopped`] if the arm may not move now, and
+    /// [`RobotError::Unsafe`]. Later: the error that ended the motion, after which nothing moves.
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
         let apart = (trajectory.start() - state.q_commanded).abs();
@@ -182,7 +183,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Starts a motion of the hand.
     ///
     /// # Errors
-    /// As for [`Robot::follow`].
+    /// [`RobotError::Latched`] or [`RobotError::Stopped`] if the arm may not move now; the errors of
+    /// [`Arm::start_hand`].
     pub fn start_hand(&mut self, command: HandCommand) -> Result<()> {
         self.ready()?;
         let started = self.arm.start_hand(command);
@@ -276,8 +278,8 @@ impl<A: CompliantArm> Robot<'_, A> {
     /// lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
-    /// As for [`Robot::follow`]; [`crate::RobotError::Configuration`] for a speed or a force that is not suitable for
-    /// contact.
+    /// As for [`Robot::follow`]; [`RobotError::Configuration`] for a speed or a force that is not suitable for
+    /// contact; [`RobotError::Planning`] if there is no straight path.
     pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
         touch_down.validate()?;
         let start = self.ready()?.q_commanded;

@@ -7,7 +7,7 @@ use sdg_fci::FciError;
 
 use crate::error::RobotError;
 
-/// Default ports of arm and hand.
+/// Default port of the arm.
 const ROBOT_PORT: u16 = 1337;
 
 /// `HOST` or `HOST:PORT`; the hand is on the next port, as in Franka's convention.

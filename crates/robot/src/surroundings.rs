@@ -160,8 +160,8 @@ impl<A: Arm> Robot<'_, A> {
     /// A path around the obstacles of the cell, whose motions satisfy the limits.
     ///
     /// # Errors
-    /// [`RobotError::NoWay`] with the blocking obstacle; [`RobotError::Unsafe`] if every path that was found violates a
-    /// limit.
+    /// [`RobotError::NoWay`] with the blocking obstacle; [`RobotError::Planning`]; [`RobotError::Unsafe`] if every path
+    /// that was found violates a limit; the errors of [`Robot::commanded`].
     pub fn plan_around(
         &mut self,
         surroundings: &Surroundings<'_>,

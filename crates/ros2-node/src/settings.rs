@@ -31,6 +31,6 @@ pub struct Settings {
     pub picture_qos: Qos,
     /// The function that teaches; it runs on a separate thread.
     pub teach: Arc<Teach>,
-    /// The teaching of the Trigger service.
+    /// Settings of teaching by the Trigger service.
     pub trigger_teaching: Option<TeachJob>,
 }

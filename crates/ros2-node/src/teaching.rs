@@ -11,7 +11,7 @@ use sdg_inputs::one_line;
 use sdg_ros2::messages::TeachRequest;
 use tempfile::TempPath;
 
-/// The inputs of a teaching.
+/// The inputs of a teaching run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
     /// The photo, followed by a colon and the file of its marks if that is not beside the photo.
@@ -84,7 +84,7 @@ pub(super) struct Teaching {
 }
 
 impl Teaching {
-    /// Begins the teaching of a request.
+    /// Begins teaching for a request.
     ///
     /// # Errors
     /// An error for an invalid request.
@@ -99,7 +99,7 @@ impl Teaching {
         Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
     }
 
-    /// The model file and the duration, or the reason why there is no model; `None` while the teaching is running.
+    /// The model file and the duration, or the reason why there is no model; `None` while teaching is in progress.
     pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
         if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;

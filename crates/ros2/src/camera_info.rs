@@ -17,8 +17,8 @@ fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
 /// Reads the camera of a message, for unrectified pictures.
 ///
 /// # Errors
-/// [`RosError::CameraInfo`] for an uncalibrated camera, a lens model other than plumb_bob, binning and regions of
-/// interest.
+/// [`RosError::CameraInfo`] for an uncalibrated camera, an invalid camera matrix, a lens model other than plumb_bob,
+/// binning and regions of interest.
 pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError> {
     let CameraInfo { width, height, distortion_model, d, k, roi, .. } = message;
     if k[0] == 0.0 {

@@ -8,7 +8,7 @@ use crate::messages::{CompressedImage, Header, Image};
 
 /// Largest width or height in pixels.
 pub const MAX_SIDE: u32 = 1 << 14;
-/// Maximum number of bytes of a picture or its message, 64 MiB: 21 megapixels of three bytes. RustDDS is slow even for
+/// Maximum number of bytes of a picture or its message, 64 MiB: 22 megapixels of three bytes. RustDDS is slow even for
 /// much smaller pictures.
 pub const MAX_BYTES: usize = 64 << 20;
 

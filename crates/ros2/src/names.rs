@@ -15,7 +15,7 @@ pub struct Naming {
 /// A remapping, `FROM:=TO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remapping {
-    /// A name of the node, `__node` or `__ns`.
+    /// A name that the node uses; or `__node` (also `__name`) or `__ns`.
     pub from: String,
     /// The replacement of the name.
     pub to: String,
@@ -41,7 +41,8 @@ impl fmt::Display for Remapping {
 }
 
 impl Naming {
-    /// Creates the naming of a node. `__node` and `__ns` in the remappings replace its name and namespace.
+    /// Creates the naming of a node. `__node` (or `__name`) and `__ns` in the remappings replace its name and its
+    /// namespace.
     ///
     /// # Errors
     /// [`RosError::Name`] for an invalid name or remapping.

@@ -41,9 +41,9 @@ const MAX_EVALUATIONS: usize = 120;
 /// hand, not measured.
 const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
-/// A pose of lower agreement is refused without a close look. Chosen by hand, for time.
+/// A pose of lower agreement is refused without a close look. Chosen by hand to save time.
 const MIN_CLOSE_LOOK_AGREEMENT: f64 = 0.3;
-/// A pose of lower agreement is not tried at other turns. Chosen by hand, for time.
+/// A pose of lower agreement is not tried at other turns. Chosen by hand to save time.
 const MIN_TURN_AGREEMENT: f64 = 0.45;
 /// Poses of lower agreement are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;

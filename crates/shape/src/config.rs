@@ -211,6 +211,8 @@ impl Default for RefinementConfig {
 /// Minimum number of edge points for recognition. Chosen by hand, not measured.
 pub(crate) const MIN_POINTS: usize = 20;
 
+/// Checks all values of a configuration.
+///
 /// # Errors
 /// [`ShapeError::InvalidConfig`] for the first value out of range.
 pub(crate) fn check_config(config: &ShapeConfig) -> Result<(), ShapeError> {

@@ -27,7 +27,7 @@ const START_STEP: f64 = 3.0;
 /// the time; chosen by hand, not measured.
 const MAX_ROUNDS: usize = 5;
 const CONVERGED_PX: f64 = 0.01;
-/// Steps that differ by less, in level pixels, are treated as one. Chosen by hand, for time.
+/// Steps that differ by less, in level pixels, are treated as one. Chosen by hand to save time.
 const MERGE_PX: f64 = 0.02;
 
 /// A pose and the share of points with a crest there.

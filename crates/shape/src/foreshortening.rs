@@ -19,7 +19,7 @@ use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 /// of that.
 const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
 const NUM_DIRECTIONS: usize = 6;
-/// Rounds of gathering crests anew. Chosen by hand, for time.
+/// Rounds of gathering crests anew. Chosen by hand to save time.
 const ROUNDS: usize = 3;
 /// Maximum tilt of a part on a table: 50°. Derived.
 const MAX_LOG_RATIO: f64 = 0.45;

@@ -20,7 +20,7 @@ const MIN_CHANGE: f64 = 0.06;
 /// by hand.
 const TURNS: (i32, f64) = (12, 0.5);
 const OFFSETS: (i32, f64) = (6, 0.005);
-/// Number of pixels used to find the axis. Chosen for time.
+/// Number of pixels used to find the axis. Chosen to save time.
 const AXIS_PIXELS: usize = 1000;
 /// Sections along the axis and across it in which the light is averaged; those nearest to the outline show the
 /// background.

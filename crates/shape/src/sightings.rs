@@ -116,7 +116,7 @@ fn seen<const N: usize>(level: &GradientLevel, place: &EdgePlace<N>, reach: usiz
     samples
 }
 
-/// Distance and trust of the crests of the gradient's component along the normal, nearest first; `None` for no crest.
+/// Distance and trust of the nearest crests of the gradient's component along the normal; `None` for no crest.
 #[inline(always)]
 fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Option<[(f32, f32); MAX_CRESTS]> {
     let len = 2 * reach + 3;

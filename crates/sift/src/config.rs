@@ -62,6 +62,8 @@ impl Default for SiftConfig {
 }
 
 impl SiftConfig {
+    /// Checks all settings.
+    ///
     /// # Errors
     /// A setting outside its range.
     pub(crate) fn check(&self) -> Result<(), SiftError> {

@@ -46,6 +46,8 @@ impl Default for RansacConfig {
 }
 
 impl RansacConfig {
+    /// Checks all settings.
+    ///
     /// # Errors
     /// A setting outside its range.
     pub(crate) fn check(&self) -> Result<(), SiftError> {

@@ -102,6 +102,8 @@ impl RotationEstimate {
 }
 
 impl RotationEstimator {
+    /// An estimator with these settings.
+    ///
     /// # Errors
     /// A setting outside its range.
     pub fn new(sift: Sift, config: RotationConfig) -> Result<Self, SiftError> {

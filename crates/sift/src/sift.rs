@@ -23,6 +23,8 @@ pub struct Sift {
 }
 
 impl Sift {
+    /// A detector with these settings.
+    ///
     /// # Errors
     /// A setting outside its range.
     pub fn new(config: SiftConfig) -> Result<Self, SiftError> {
@@ -99,6 +101,8 @@ impl Sift {
     }
 }
 
+/// Checks that a mask has the size of the image.
+///
 /// # Errors
 /// A mask whose size differs from the image's.
 pub(crate) fn check_mask(image: &Plane, mask: Option<&Mask>) -> Result<(), SiftError> {

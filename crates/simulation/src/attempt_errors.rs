@@ -1,4 +1,4 @@
-//! Errors of a workcell during grasps: a wrong camera pose, worn pads, a shaken hand.
+//! Errors of a workcell: a wrong camera pose, worn pads, a shaken hand, faults of the arm, joint friction.
 
 use std::f64::consts::TAU;
 
@@ -6,16 +6,19 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Error of the assumed camera position, in metres, and of its orientation, in degrees.
+/// Error of the assumed camera position, in metres.
 const HAND_EYE_SHIFT_M: f64 = 0.002;
+/// Error of the assumed camera orientation, in degrees.
 const HAND_EYE_TURN_DEG: f64 = 0.5;
 
 /// Sliding friction of worn or dusty pads.
 const PAD_FRICTIONS: std::ops::Range<f64> = 0.6..0.8;
 
-/// Amplitude of the hand's swing, in metres, its frequency, in Hz, and its duration, in seconds.
+/// Amplitude of the hand's swing, in metres.
 const SHAKE_AMPLITUDES_M: std::ops::Range<f64> = 0.020..0.030;
+/// Frequency of the swing, in Hz.
 const SHAKE_FREQUENCIES_HZ: std::ops::Range<f64> = 2.0..3.0;
+/// Duration of the swing, in seconds.
 const SHAKE_SECS: f64 = 1.0;
 
 /// A hand that swings along a horizontal line.

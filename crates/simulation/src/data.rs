@@ -40,7 +40,7 @@ impl Data {
     /// The initial state of a model; the positions of all its objects are computed.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] if memory runs out.
+    /// [`SimulationError::MuJoCo`] if memory runs out; the errors of [`Self::forward`].
     pub fn new(model: Arc<Model>) -> Result<Self> {
         // SAFETY: the model is live.
         let ptr = guarded("mj_makeData", || unsafe { mj::mj_makeData(model.as_ptr()) })?;

@@ -45,10 +45,10 @@ pub enum SimulationError {
         message: String,
     },
 
-    /// The model has no object of that kind and name.
+    /// A name that does not exist among those of its kind.
     #[error("unknown {kind} {name:?}; known: {}", existing.join(", "))]
     UnknownName {
-        /// Body, joint, geom, site, camera or actuator.
+        /// The kind: an object of the model such as a body or a joint, a part, an axis, or an option.
         kind: &'static str,
         /// The requested name.
         name: String,
@@ -62,7 +62,7 @@ pub enum SimulationError {
         reason: String,
     },
 
-    /// A file of the object or the scene could not be read.
+    /// A file of a part could not be read or written, or has invalid content.
     #[error("{}: {reason}", path.display())]
     File {
         path: PathBuf,

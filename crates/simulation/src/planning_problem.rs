@@ -12,7 +12,7 @@ use crate::obstacles::random_obstacles;
 /// A free start and a free goal among random obstacles.
 #[derive(Debug, Clone)]
 pub struct PlanningProblem {
-    /// The obstacles, one to eight.
+    /// The obstacles: one to eight, and in an obstructed problem up to [`Self::MAX_ADDED`] more.
     pub obstacles: Vec<Obstacle>,
     /// The collision model of arm and obstacles, with the hand open.
     pub model: CollisionModel,

@@ -5,8 +5,8 @@
 //!   back.
 //! - [`soak`]: long runs of live detection, of the page, and of a camera that disconnects.
 //!
-//! It runs the program `sdg` from outside, as a user does, and uses none of its crates except `calibration`, to render
-//! the board.
+//! It runs the program `sdg` from outside, as a user does, and uses of its crates only `calibration` and `geometry`, to
+//! render the board.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 pub mod boards;

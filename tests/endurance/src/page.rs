@@ -69,7 +69,7 @@ impl Page {
     /// model S and tests it.
     ///
     /// # Errors
-    /// A rejected request; a failed teaching.
+    /// A rejected request; failed teaching.
     pub fn mark_teach_and_try(&self, picture: &[u8]) -> Result<()> {
         self.ask("GET", "/", b"")?;
         let session = self.json("GET", "/api/session", b"")?;

@@ -238,7 +238,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// Number of kills between repetitions of the command: a teaching takes seconds.
+    /// Number of kills between repetitions of the command: teaching takes seconds.
     pub fn again_every(self) -> u64 {
         if self == Self::Teach { 4 } else { 1 }
     }

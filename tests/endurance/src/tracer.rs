@@ -218,7 +218,7 @@ impl Call {
         Ok(Self { tid, number: found.orig_rax as c_long, arguments, answer: found.rax as i64 })
     }
 
-    /// The descriptor that is written or synced: the second one if bytes are copied between files.
+    /// The descriptor that is written or synced: of `copy_file_range` the second one, of the other calls the first.
     fn descriptor(&self) -> Option<PathBuf> {
         let argument = match self.number {
             libc::SYS_copy_file_range => 2,

@@ -32,7 +32,7 @@ impl Paper {
         }
     }
 
-    /// The name of the option value.
+    /// The name in the sheet's description and at the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::A4 => "a4",
@@ -129,7 +129,7 @@ impl Sheet {
     /// Reads the board from a file of [`Self::to_svg`] or [`Self::to_pdf`].
     ///
     /// # Errors
-    /// [`CalibrationError::NoBoardFile`] if the file does not contain the description.
+    /// [`CalibrationError::NoBoardFile`] if the file does not contain the description; the errors of [`Board::new`].
     pub fn board_of(file: &str) -> Result<Board, CalibrationError> {
         let facts =
             file.split_once("sdg-board squares=").map(|(_, facts)| facts).ok_or(CalibrationError::NoBoardFile)?;

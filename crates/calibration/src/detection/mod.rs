@@ -38,7 +38,8 @@ const MAX_SIDE: u32 = 2000;
 /// Pixels with the first centre at (0.5, 0.5); corners in [`Board`]'s order, row by row.
 ///
 /// # Errors
-/// [`CalibrationError::BoardNotFound`], [`CalibrationError::BoardUnclear`], [`CalibrationError::OtherBoard`].
+/// [`CalibrationError::BoardNotFound`], [`CalibrationError::BoardUnclear`], [`CalibrationError::OtherBoard`],
+/// [`CalibrationError::OtherCheckerboard`].
 pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>, CalibrationError> {
     let full = Luminance::of(picture);
     let mut level = full.clone();

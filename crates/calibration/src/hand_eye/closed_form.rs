@@ -20,9 +20,10 @@ const MIN_SECOND_TURN_DEG: f64 = 4.0;
 /// The lever arm, in metres, that converts shifts to angles: about the distance of boards from flanges.
 const LEVER_M: f64 = 0.3;
 
-/// The board has the given size.
+/// The size of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BoardSize {
+    /// The given size.
     Told,
     /// The board's size is a multiple of the given one; the factor is estimated.
     Free,
@@ -80,7 +81,7 @@ pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size:
     Some(Closed { x, y, board_scale, left_rad: left.sqrt() })
 }
 
-/// Residual of the rotations between neighbouring pictures: root mean square, in radians.
+/// Residual of the rotations between pictures at most [`NEAR`] apart: root mean square, in radians.
 pub(super) fn turns_left(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> f64 {
     let pairs = pairs(motions, boards, NEAR);
     let left = turn_between(&pairs).map(|rotation| squares_of_turns(&rotation, &pairs) / pairs.len() as f64);

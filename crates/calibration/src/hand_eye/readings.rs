@@ -55,7 +55,7 @@ const ROUNDING_RAD: f64 = 1e-5;
 /// about each axis is then 3.14 "degrees".
 const MAX_TINY_RAD: f64 = 0.1;
 
-/// All readings whose rotations match the board's, the simplest first.
+/// All readings whose rotations match the board's no worse than the given ones do, the simplest first.
 pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
     let left = |robot: &[Isometry3<f64>]| {
         let motions: Vec<_> = robot.iter().map(|pose| motion(mount, pose)).collect();

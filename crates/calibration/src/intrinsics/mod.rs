@@ -80,10 +80,10 @@ pub struct PictureFit {
 pub const MIN_PICTURES: usize = 3;
 /// Residual, in pixels, above which the weight decreases while pictures are compared: a few times the error of corners.
 const ROBUST_PX: f64 = 1.0;
-/// A picture is excluded if its RMS is at least this many times the median and at least [`MAX_RMS_PX`].
+/// A picture is excluded if its RMS is above this many times the median and above [`MAX_RMS_PX`].
 const MAX_RMS_RATIO: f64 = 3.0;
 const MAX_RMS_PX: f64 = 0.5;
-/// Corners at this many times the RMS, and at least the given number of pixels, are excluded at the end.
+/// Corners beyond this many times the RMS are excluded at the end.
 const MAX_CORNER_RATIO: f64 = 6.0;
 /// Largest relative standard error of the focal length in a valid calibration.
 const MAX_FOCAL_SIGMA: f64 = 0.03;

@@ -91,7 +91,7 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// Error at the sheet's centre, in metres.
+    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show it.
     pub at_sheet_m: f64,
     /// Largest error along the picture's border, in metres, where it shows the plane at that height.
     pub at_border_m: f64,

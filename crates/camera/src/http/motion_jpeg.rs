@@ -23,6 +23,8 @@ pub(super) struct MotionJpeg {
 }
 
 impl MotionJpeg {
+    /// A source of JPEG pictures from the body of a response with this content type.
+    ///
     /// # Errors
     /// Text that says that the content type has no boundary.
     pub(super) fn new(content_type: &str, body: Body, frame: PixelFrame) -> Result<Self, String> {

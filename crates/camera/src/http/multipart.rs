@@ -30,6 +30,8 @@ enum State {
 }
 
 impl Multipart {
+    /// A parser for bodies of this content type.
+    ///
     /// # Errors
     /// Text that says that the content type has no boundary.
     pub(super) fn new(content_type: &str) -> Result<Self, String> {

@@ -28,7 +28,7 @@ pub struct Format {
     pub description: String,
     /// The encoding, if supported.
     pub encoding: Option<Encoding>,
-    /// Sizes in pixels: a list, or a range with steps.
+    /// Sizes in pixels: a list, or a range.
     pub sizes: Sizes,
     /// Maximum frame rate of each of [`Sizes::Listed`], in frames per second; 0 if the driver does not state it. Empty
     /// for an unsupported encoding.
@@ -50,7 +50,7 @@ pub enum Sizes {
 }
 
 impl Sizes {
-    /// The size closest to the wanted one in area and aspect ratio, and its index in the list.
+    /// The size whose width and height differ least from the wanted ones, and its index in the list; 0 for a range.
     pub(super) fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
         match self {
             Self::Listed(sizes) => {

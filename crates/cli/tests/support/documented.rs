@@ -53,7 +53,7 @@ fn described_words(verb: &str) -> BTreeSet<String> {
             // Each picture has detections as `sdg detect` prints them.
             text += &sections(&read("command-line.md"), &|title| title.starts_with("`sdg detect --json`"));
         }
-        // A teaching is printed as the model file has it.
+        // The facts of teaching are printed as the model file has them.
         "teach" => text += &sections(&read("file-formats.md"), &|title| title == "Grasp model"),
         _ => {}
     }

@@ -17,9 +17,9 @@ use crate::rpn::ImageSize;
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// Standard deviations of the predictors' initial weights: small, so that training starts from
-/// undecided classes and unmoved boxes.
+/// Standard deviation of the initial weights of the scores: small, so that training starts from undecided classes.
 const SCORE_STD: f64 = 0.01;
+/// Standard deviation of the initial weights of the deltas: small, so that training starts from unmoved boxes.
 const DELTA_STD: f64 = 0.001;
 
 /// Pooling and two fully connected layers.

@@ -60,7 +60,8 @@ impl KeypointHead {
         self.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x))
     }
 
-    /// Returns the cross-entropy over the cells, divided by the number of keypoints with a cell.
+    /// Returns the cross-entropy over the cells, divided by the number of keypoints with a cell, times the configured
+    /// weight.
     pub fn loss(&self, features: &[Tensor<4>; 5], rois: &[SampledRoi], targets: &[ResizedTarget]) -> Tensor<1> {
         let size = self.config.heatmap_size();
         let cells: Vec<Option<usize>> = rois

@@ -94,7 +94,8 @@ impl MaskHead {
         logits.reshape([r * k, s * s]).select(0, maps)
     }
 
-    /// Returns the binary cross-entropy of the true class's map, averaged over all cells of all ROIs.
+    /// Returns the binary cross-entropy of the true class's map, averaged over all cells of all ROIs, with the
+    /// configured weights.
     ///
     /// `rois` are at least one, all on objects; `image_sizes` are those of the resized images.
     pub fn loss(

@@ -14,7 +14,8 @@ pub struct BoxMask {
 }
 
 impl BoxMask {
-    /// The mask on an image of `width × height` pixels: the pixels with at least `threshold`.
+    /// The mask on an image of `width × height` pixels: the pixels with at least `threshold`; for
+    /// [`MaskPasting::WholePixels`], those above it.
     ///
     /// `bounds` is in pixels of that image.
     pub fn paste(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f64, pasting: MaskPasting) -> Mask {
@@ -25,6 +26,8 @@ impl BoxMask {
         }
     }
 
+    /// The mask by [`MaskPasting::PixelCenters`].
+    ///
     /// # Source
     /// Detectron2's `paste_masks_in_image`: bilinear, zeros outside, at least the threshold.
     fn paste_pixel_centers(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
@@ -62,6 +65,8 @@ impl BoxMask {
         blend([cell(0, 0), cell(1, 0), cell(0, 1), cell(1, 1)], fx, fy)
     }
 
+    /// The mask by [`MaskPasting::WholePixels`].
+    ///
     /// # Source
     /// torchvision's `paste_masks_in_image`: the padded mask over the box, which is enlarged by the same factor
     /// and truncated to whole pixels, including the last ones; above the threshold, as in its examples.

@@ -44,7 +44,7 @@ impl LabelledFolder {
     /// # Errors
     /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the
     /// picture or for another picture size; two files label the same picture; an instance that is not optional has no
-    /// grasp; there are several labels, none of which is selected.
+    /// grasp; there are several labels, none of which is selected; the model was taught from all pictures.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let mut others = 0;

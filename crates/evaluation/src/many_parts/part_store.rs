@@ -1,4 +1,4 @@
-//! Stores the results of each part: the model file, and a record of the teaching's inputs.
+//! Stores the results of each part: the model file, and a record of the inputs of teaching.
 
 use std::path::{Path, PathBuf};
 
@@ -19,12 +19,12 @@ pub struct PartStore(PathBuf);
 /// The record of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartRecord {
-    /// The teaching's inputs: files, arguments, version.
+    /// The inputs of teaching: files, arguments, version.
     pub key: Value,
     pub outcome: PartOutcome,
 }
 
-/// The outcome of a teaching.
+/// The outcome of a teaching run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartOutcome {

@@ -35,7 +35,7 @@ impl Cell<'_> {
         format!("models/{}{}.sdg", self.network(), marks.suffix())
     }
 
-    /// The path of the file with the outcome of the teaching.
+    /// The path of the file with the outcome of teaching.
     pub(super) fn teaching_file(self, marks: Marks) -> String {
         self.network().file(&format!("teaching{}", marks.suffix()))
     }
@@ -70,7 +70,7 @@ impl Cell<'_> {
         store.read(&self.file("speed"))
     }
 
-    /// The model; `None` if the teaching gave none.
+    /// The model; `None` if teaching gave none.
     pub(super) fn read_model(self, marks: Marks, store: &Store) -> Result<Option<GraspModel>> {
         match self.teaching_from(marks, store)? {
             Some(TeachingRecord::Taught { .. }) => {}

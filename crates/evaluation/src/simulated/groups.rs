@@ -1,4 +1,5 @@
-//! Two groups of parts with separate sums: the paper's parts, and the parts on which no constant was ever fitted.
+//! Two groups of parts with separate sums: the paper's parts, and parts on which no constant was fitted except
+//! `sdg_robot::height::RELIEF_M`.
 
 use sdg_simulation::objects::ObjectSpec;
 use serde::Serialize;
@@ -8,7 +9,7 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum PartGroup {
     Paper,
-    /// Four other parts, which were used for no choice.
+    /// Four other parts.
     HeldOut,
 }
 

@@ -9,14 +9,14 @@
 //! ```
 //!
 //! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work that is
-//! stored completely or not at all: one teaching, one attempt, the pictures of one part. A **cell** is one model on one
+//! stored completely or not at all: a teaching run, an attempt, the pictures of a part. A **cell** is one model on one
 //! part. Random choices depend only on the seed, the part and the attempt's number, so every model gets the same
 //! scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats
 //! them.
 //!
-//! In [`sharing`], many processes do the same units, on the machines of a cluster.
+//! In [`sharing`], many processes share the units, on the machines of a cluster.
 //!
-//! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching without a
+//! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching run without a
 //! model is a result as well: all attempts of its cell count as failed.
 
 mod attempting;

@@ -8,16 +8,16 @@ use serde::{Deserialize, Serialize};
 use crate::rehearsal::{Looks, RehearsedAttempt, step_name};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
-/// Number of steps per stored value of a teaching's loss.
+/// Number of steps per stored value of the loss.
 pub const LOSS_STEPS: usize = 10;
 
-/// The outcome of a teaching.
+/// The outcome of a teaching run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TeachingRecord {
-    /// The teaching gave a model.
+    /// Teaching gave a model.
     Taught {
-        /// The model's description of the teaching.
+        /// The model's description of its teaching run.
         facts: Box<TeachingFacts>,
         /// Size of the model file.
         bytes: usize,

@@ -50,7 +50,7 @@ impl Settings {
         }
     }
 
-    /// The settings on which a teaching depends.
+    /// The settings on which a teaching run depends.
     pub fn teaching(&self) -> TeachingSettings {
         TeachingSettings {
             preset: self.preset.clone(),
@@ -62,8 +62,8 @@ impl Settings {
     }
 }
 
-/// The settings that determine a teaching, besides model, part and marks. The protocol and the axes use the same
-/// teachings.
+/// The settings that determine a teaching run, besides model, part and marks. The protocol and the axes use the same
+/// teaching runs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TeachingSettings {
     /// Network, training and augmentation.

@@ -6,14 +6,16 @@
 //! DIR/cells/C-pendulum.teaching.json          result of teaching
 //! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
 //! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten after each
+//! DIR/cells/C-pendulum.speed.json             seconds per picture
 //! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
 //! DIR/axes/C-pendulum.tilt.json               pictures of an axis
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
+//! DIR/cameras/C-pendulum.tilt.json            pictures of a set for calibrated cameras
 //! ```
 //!
-//! Each JSON file contains the settings with which it was made, and is written atomically. A teaching contains only the
-//! settings of teachings, so that the protocol and the axes use the same teachings for any number of attempts or
-//! pictures.
+//! Each JSON file contains the settings with which it was made, and is written atomically. Results of teaching
+//! contain only the settings of teaching, so that the protocol and the axes use the same models for any number of
+//! attempts or pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,7 +32,7 @@ use crate::error::EvaluationError;
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// The folder of an evaluation, locked by this process.
+/// The folder of an evaluation, locked by this process, alone or together with others.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,

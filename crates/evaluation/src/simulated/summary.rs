@@ -37,7 +37,7 @@ pub struct ModelSummary {
     pub model: ModelKind,
     /// The model whose network is used; the model itself, unless it uses another model's.
     pub network: ModelKind,
-    /// Number of teachings that gave a model, of all teachings.
+    /// Number of teaching runs that gave a model, of all teaching runs.
     pub taught: Share,
     /// Number of samples for the detector: the median over the parts.
     pub samples: Option<f64>,
@@ -59,7 +59,7 @@ pub struct ModelSummary {
 pub struct CellSummary {
     pub model: ModelKind,
     pub object: String,
-    /// Outcome of the teaching; `None` if it has not ended.
+    /// Outcome of teaching; `None` if it has not ended.
     pub teaching: Option<TeachingRecord>,
     /// Results with the check against the demonstration.
     pub verified: Figures,
@@ -232,7 +232,7 @@ fn model_summary(model: ModelKind, teachings: &[TeachingRecord], [verified, alon
     }
 }
 
-/// The records of a cell, with the check or without. If the teaching failed, every attempt counts as failed and every
+/// The records of a cell, with the check or without. If teaching failed, every attempt counts as failed and every
 /// part as missed.
 fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store) -> Result<Gathered> {
     let settings = store.settings();

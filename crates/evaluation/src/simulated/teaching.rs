@@ -34,7 +34,7 @@ impl Teaching<'_> {
     /// Teaches a cell's network and stores it. Returns the result in words, or `None` if interrupted.
     ///
     /// # Errors
-    /// Files cannot be written. A teaching without a model is not an error.
+    /// Files cannot be written. A teaching run without a model is not an error.
     pub(super) fn teach(
         &self,
         cell: Cell,
@@ -106,7 +106,7 @@ fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstr
     Ok((seen.remove(0), lengths))
 }
 
-/// The losses of a teaching, averaged over groups of steps for storage.
+/// The losses of a teaching run, averaged over groups of steps for storage.
 fn mean_losses(history: &History) -> Vec<f64> {
     let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
     history.steps.chunks(LOSS_STEPS).map(mean).collect()

@@ -26,7 +26,7 @@ impl Evaluation<'_> {
     /// Runs the remaining units until `is_interrupted` returns true, and keeps all finished units.
     ///
     /// # Errors
-    /// Files cannot be read or written, or the simulator fails. A failed teaching is not an error.
+    /// Files cannot be read or written, or the simulator fails. A failed teaching run is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<ControlFlow<()>> {
         let tasks = self.tasks()?;
         let without_speed = self.without_speed()?;

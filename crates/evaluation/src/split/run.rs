@@ -26,7 +26,7 @@ pub struct ReadySet {
 pub struct SetRun {
     pub set: SplitSet,
     pub seed: u64,
-    /// Duration of the teaching, in seconds.
+    /// Duration of teaching, in seconds.
     pub teach_secs: f64,
     pub tested: Vec<Tested>,
 }
@@ -45,7 +45,7 @@ pub(super) fn kind_of(tested: &Tested) -> &str {
 }
 
 impl ReadySet {
-    /// Reads and checks the files of a set, before the teaching, which takes long.
+    /// Reads and checks the files of a set, before teaching, which takes long.
     ///
     /// # Errors
     /// The folder does not exist, or the demonstration or the `truth.json` is invalid.

@@ -17,7 +17,7 @@ const MOTION_TIMEOUT: Duration = Duration::from_secs(60);
 pub struct HandConfig {
     /// TCP port of the hand.
     pub port: u16,
-    /// Maximum duration of every wait for a state.
+    /// Maximum duration of connecting and of each wait for a state.
     pub timeout: Duration,
 }
 
@@ -80,7 +80,7 @@ impl Hand {
         self.session.receive(STATE_SIZE, true, HandState::decode)
     }
 
-    /// Finds the range of the fingers by opening and closing them.
+    /// Finds the range of the fingers by opening and closing them. Returns whether this succeeded.
     ///
     /// # Errors
     /// [`FciError::Refused`] if the hand fails or is stopped, and the errors of the connection.
@@ -88,7 +88,7 @@ impl Hand {
         self.execute(&HandRequest::Homing)
     }
 
-    /// Moves the fingers to a width (m) at a speed (m/s).
+    /// Moves the fingers to a width (m) at a speed (m/s). Returns whether this succeeded.
     ///
     /// # Errors
     /// As for [`Hand::homing`].

@@ -24,7 +24,7 @@ pub struct RobotConfig {
     pub port: u16,
     /// The protocol version. With `None`, the client tries version 5, then the version that the robot answers.
     pub version: Option<Version>,
-    /// Maximum duration of every wait for a response or a state.
+    /// Maximum duration of a wait for a response or a state; for stop and recovery it is 10 s.
     pub timeout: Duration,
 }
 

@@ -54,7 +54,7 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// Connects. `timeout` is the maximum duration of every wait for a response or a state.
+    /// Connects. `timeout` limits connecting, sending and each wait for a state; [`Self::wait_for`] has its own limit.
     pub(crate) fn connect(address: SocketAddr, kind: HeaderKind, timeout: Duration) -> Result<Self> {
         let stream = TcpStream::connect_timeout(&address, timeout)
             .map_err(|source| socket_error("connect to", address, source))?;
@@ -91,7 +91,7 @@ impl Session {
         Ok(local.port())
     }
 
-    /// Waits for the response to a command.
+    /// Waits for the response to a command, without a limit if `timeout` is `None`.
     pub(crate) fn wait_for(&mut self, id: u32, what: &'static str, timeout: Option<Duration>) -> Result<Vec<u8>> {
         let deadline = timeout.map(|timeout| Instant::now() + timeout);
         loop {
@@ -133,7 +133,7 @@ impl Session {
     /// Processes the received messages.
     ///
     /// # Errors
-    /// [`FciError::Closed`] if the peer is disconnected.
+    /// [`FciError::Closed`] if the peer is disconnected, [`FciError::Wire`] for an invalid message.
     fn fetch(&mut self) -> Result<()> {
         loop {
             match self.incoming.try_recv() {
@@ -224,7 +224,7 @@ impl Session {
         Some(length)
     }
 
-    /// Answers to the sender of the states.
+    /// Sends a datagram to the sender of the states.
     pub(crate) fn answer(&self, datagram: &[u8]) -> Result<()> {
         let peer = self.udp_peer.unwrap_or(self.address);
         self.udp.send_to(datagram, peer).map_err(|source| socket_error("send to", peer, source))?;

@@ -12,7 +12,7 @@ const NUM_BINS: usize = 5000;
 pub struct ControlStatistics {
     /// Number of answered states.
     pub num_answers: u64,
-    /// Number of states, one per millisecond of the robot, that arrived too late for an answer.
+    /// Number of states without an answer, lost or overtaken by a newer one; the robot sends one per millisecond.
     pub num_skipped: u64,
     /// Longest time between two states, by this computer's clock.
     pub max_gap: Duration,

@@ -28,7 +28,7 @@ pub struct PlumbBob {
 
 /// Maximum number of steps of Newton's method. Five suffice for existing lenses.
 const MAX_STEPS: usize = 30;
-/// Tolerance of Newton's method, at depth 1: about a millionth of a pixel.
+/// Tolerance of Newton's method, at depth 1: less than a millionth of a pixel.
 const TOLERANCE: f64 = 1e-10;
 
 impl PlumbBob {

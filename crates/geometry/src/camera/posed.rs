@@ -25,14 +25,14 @@ impl Ray {
 /// A camera with its pose in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosedCamera {
-    /// Size and focal length.
+    /// Size, focal lengths, centre and lens.
     pub intrinsics: PinholeCamera,
     /// Transform from the optical frame (x right, y down, z forward) to the world, metres.
     pub world_from_camera: Isometry3<f64>,
 }
 
 impl PosedCamera {
-    /// The pixel of a point in the world; `None` behind the camera.
+    /// The pixel of a point in the world; `None` at or behind the camera and outside the lens's range.
     pub fn project(&self, p_in_world: &Point3<f64>) -> Option<Point2<f64>> {
         self.intrinsics.project(&self.world_from_camera.inverse_transform_point(p_in_world))
     }

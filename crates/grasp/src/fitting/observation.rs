@@ -70,6 +70,8 @@ pub(super) struct PreparedPart<'a> {
 }
 
 impl<'a> PreparedPart<'a> {
+    /// Prepares every part.
+    ///
     /// # Errors
     /// A demonstration that cannot be taught.
     pub(super) fn prepare_all(parts: &'a [FitPart], seed: u64) -> Result<Vec<Self>> {
@@ -87,6 +89,8 @@ impl<'a> PreparedPart<'a> {
             .collect()
     }
 
+    /// Observes every part with a configuration.
+    ///
     /// # Errors
     /// A configuration out of range.
     pub(super) fn observe_all(parts: &[Self], config: &CheckConfig) -> Result<Vec<PartObservations>> {

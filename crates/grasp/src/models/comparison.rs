@@ -17,7 +17,7 @@ use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
 /// Maximum number of compared candidates of an image: those with the highest class and box scores. Each takes three to
-/// five views. In the paper's protocol, a maximum of 16 found no further part, and 616 of the 3200 pictures had five
+/// six views. In the paper's protocol, a maximum of 16 found no further part, and 616 of the 3200 pictures had five
 /// candidates or more.
 const MAX_COMPARED: usize = 5;
 /// Maximum number of candidates of an image whose poses are corrected before their features are compared at high

@@ -19,7 +19,7 @@ use crate::taught::TaughtDemonstration;
 /// Heights are in metres above the table.
 ///
 /// # Errors
-/// A camera whose pictures do not show the plane, and marks outside the visible part of the plane.
+/// No demonstration, a camera whose pictures do not show the plane, and marks outside the visible part of the plane.
 pub fn seen_from_above(
     demonstrations: &[Demonstration],
     over_table: &CameraOverTable,

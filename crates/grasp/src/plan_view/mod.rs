@@ -94,7 +94,7 @@ impl PlanViewDetector {
     /// Prepares all data that are the same in every picture of the camera.
     ///
     /// # Errors
-    /// A model that was taught without a camera; a camera whose pictures do not show the plane.
+    /// A model that was taught without a camera; a camera whose pictures do not show the plane, or not the region.
     pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
@@ -130,7 +130,7 @@ impl PlanViewDetector {
     /// Continues with another camera, or with the same camera at another pose.
     ///
     /// # Errors
-    /// A camera whose pictures do not show the plane; the detector is then unchanged.
+    /// A camera whose pictures do not show the plane, or not the searched region; the detector is then unchanged.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
         let view = plan_view(over_table, &self.lengths)?;
         let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;

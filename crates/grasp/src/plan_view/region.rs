@@ -21,6 +21,8 @@ pub(super) struct RegionInPlan {
 }
 
 impl RegionInPlan {
+    /// Finds the bounds of a region of the pictures in the plan view.
+    ///
     /// # Errors
     /// A region outside the camera's pictures, or one that shows nothing of the plan view.
     pub(super) fn new(region: &SearchRegion, camera: &PosedCamera, view: &PlanView) -> Result<Self> {

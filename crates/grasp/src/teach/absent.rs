@@ -23,7 +23,7 @@ use crate::taught::TaughtDemonstration;
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
 /// hand, not measured.
 const SAMPLE_INTERVAL: u64 = 12;
-/// Number of held-out samples with the part for the calibration of the score. Chosen for time: one takes about 50 ms.
+/// Number of held-out samples with the part for calibrating the score. Chosen to save time: one takes about 50 ms.
 const NUM_POSITIVES: u64 = 12;
 /// First index of these samples: far beyond the samples for the networks' validation, and separate from those for the
 /// reported quality.

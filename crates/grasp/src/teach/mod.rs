@@ -2,12 +2,11 @@
 //!
 //! ```text
 //! demonstrations ─ (model A: crops ─ orientation CNN)
-//!        │
 //!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
 //!        │      ├─ held-out samples ─── validation ─────────┴─ calibrate ─ GraspModel
-//!        │      └─ scenes without the part ────────────────────────┘│
-//! pictures without the part ─ some of the samples, and the scores of detections in them ─┘
-//!        └─ (model S: nothing to train) ──────────────────────────────────────┘
+//!        │      └─ scenes without the part ────────────────────────┘            │
+//!        └─ (model S: nothing to train) ────────────────────────────────────────┤
+//! pictures without the part ─ some of the samples, and the scores in them ──────┘
 //! ```
 
 mod absent;
@@ -75,12 +74,12 @@ pub struct Taught {
     pub history: Option<History>,
 }
 
-/// Teaches a grasp model. `observe` is called after every step and validation, and may stop the teaching, which then
+/// Teaches a grasp model. `observe` is called after every step and validation, and may stop teaching, which then
 /// keeps the best network so far if it is good enough.
 ///
 /// # Errors
 /// No demonstration, a demonstration that lacks marks required by the model or is among the pictures without the part,
-/// or a training without a usable result.
+/// a region in which the part cannot be searched, missing base weights, or a training without a usable result.
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -126,8 +125,8 @@ pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOp
 /// measured.
 const MIN_PART_PX: f64 = 20.0;
 
-/// Checks the marks: every model needs the grasp line and enough pixels of the part, and model D an outline with
-/// texture or shape inside.
+/// Checks the marks: every model needs the grasp line and enough pixels of the part, and model D also an outline.
+/// Several demonstrations must agree.
 fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
     if demonstrations.is_empty() {
         return Err(GraspError::NoDemonstration);
@@ -172,9 +171,9 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     Ok(())
 }
 
-/// Number of scenes of other objects for the calibration of the agreement. Chosen by hand for time, not measured.
+/// Number of scenes of other objects for the calibration of the agreement. Chosen by hand to save time, not measured.
 const NUM_NEGATIVE_SCENES: u64 = 12;
-/// The number for model S, which must be ready in less than a second. Chosen by hand for time, not measured.
+/// The number for model S, which must be ready in less than a second. Chosen by hand to save time, not measured.
 pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;
 
 /// The demonstrations as stored in the model.

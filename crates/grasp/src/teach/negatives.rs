@@ -31,15 +31,15 @@ pub(crate) struct NegativeScenes {
     demonstrations: Vec<TaughtDemonstration>,
 }
 
-/// Photos with more pixels are halved before scenes are composed from them. Chosen for time: model S must be taught in
-/// a second.
+/// Photos with more pixels are halved before scenes are composed from them. Chosen to save time: model S must be taught
+/// in a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
 impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.
     ///
     /// # Errors
-    /// As for [`Augmenter::new`].
+    /// As for [`Augmenter::new`]; a demonstration from which nothing can be taught.
     pub(crate) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
         // No pieces of the part: they agree with it, but do not occur on a table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };

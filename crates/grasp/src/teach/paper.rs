@@ -37,6 +37,8 @@ pub(super) fn network(kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
     config
 }
 
+/// The settings of the detector's training.
+///
 /// # Source
 /// Paper, section V; the published code's settings.
 pub(super) fn training(kind: ModelKind, seed: u64) -> TrainingConfig {

@@ -4,13 +4,14 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::ResizeRule;
 use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
 
-/// Short side of the images in teaching and detection with an R50. Chosen by hand for time; the loss was not measured.
+/// Short side of the images in teaching and detection with an R50. Chosen by hand to save time; its effect on accuracy
+/// was not measured.
 pub(super) const SHORT_SIDE_PX: u32 = 480;
 
 /// An R50 with the numerics of its weights, except for two changes that save minutes on such a computer. Images are not
 /// enlarged to 800 pixels, which adds no detail to a photo of 480. COCO images show dozens of objects, but
 /// demonstrations show one, so that fewer regions go through the heads; the keypoint head takes 7 GFLOP for each. The
-/// numbers were chosen by hand for time; the loss was not measured.
+/// numbers were chosen by hand to save time; their effect on accuracy was not measured.
 pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
     const MAX_PROPOSALS: usize = 100;
     const MAX_DETECTIONS: usize = 5;

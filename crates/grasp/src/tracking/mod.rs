@@ -95,7 +95,7 @@ pub struct TrackerConfig {
     /// a change causes a search before the frame is answered. Chosen by hand: just above the period of 30 frames per
     /// second. Zero if frames wait for the tracker.
     pub moves_within: Duration,
-    /// Maximum number of parts that are followed at the same time. Chosen by hand, for time: each takes some
+    /// Maximum number of parts that are followed at the same time. Chosen by hand to save time: each takes some
     /// milliseconds per frame.
     pub max_parts: usize,
 }

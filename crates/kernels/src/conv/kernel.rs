@@ -49,6 +49,8 @@ pub(crate) fn convolve(
     unsafe { output.into_vec() }
 }
 
+/// Computes the convolution, or the transposed one, directly from the input.
+///
 /// # Safety
 /// Nothing else accesses `output`.
 unsafe fn run_direct(

@@ -81,6 +81,8 @@ mod vector {
     /// rows has eight sums, four common vectors, a factor and a product: fourteen. A third row would spill.
     pub(super) const ROWS: usize = 2;
 
+    /// Loads four floats.
+    ///
     /// # Safety
     /// `from` is valid for four floats.
     #[inline(always)]
@@ -89,6 +91,8 @@ mod vector {
         unsafe { v128_load(from.cast()) }
     }
 
+    /// Stores four floats.
+    ///
     /// # Safety
     /// `to` is valid for four floats.
     #[inline(always)]

@@ -55,6 +55,8 @@ pub(crate) fn transpose(
     }
 }
 
+/// Transposes blocks of 8 × 8.
+///
 /// # Safety
 /// AVX is available; `rows` and `columns` are multiples of 8 and within both buffers.
 #[cfg(target_arch = "x86_64")]

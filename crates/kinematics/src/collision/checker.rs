@@ -71,7 +71,7 @@ impl<'a> Checker<'a> {
 
     /// The smallest distance between two bodies at each configuration, m, negative if they overlap.
     ///
-    /// Distances to boxes, cylinders and capsules are too large by at most 2⁻¹³ of the body's length (0.03 mm).
+    /// Distances to obstacles are too large by at most 2⁻¹³ of a capsule's length (0.03 mm).
     pub fn distances_m(&mut self, configurations: &[JointVector]) -> Vec<f64> {
         let mut distances = Vec::with_capacity(configurations.len());
         for chunk in configurations.chunks(NUM_LANES) {

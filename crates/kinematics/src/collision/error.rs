@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CollisionError {
-    /// A length is not a positive, finite number.
+    /// A length is outside its range.
     #[error("{obstacle}: {what} must be {expected}, found {found}")]
     Size {
         /// The obstacle.

@@ -88,7 +88,7 @@ impl CollisionModel {
     /// Adds a held part: capsules that contain it, in the tcp's frame. The part may touch the hand and links 6 and 7.
     ///
     /// # Errors
-    /// [`CollisionError`] for coordinates that are not finite and radii that are not positive.
+    /// [`CollisionError`] for coordinates that are not finite, and for radii that are not positive or exceed 100 m.
     pub fn hold(&mut self, part_in_tcp: &[Capsule]) -> Result<(), CollisionError> {
         let name = || "the held part".to_owned();
         for capsule in part_in_tcp {

@@ -1,7 +1,7 @@
 //! The smallest distance between the arm and all bodies around it, for the configurations of all lanes.
 //!
-//! Bodies are compared as spheres, then as capsules around their centres. The exact distance is computed only if these
-//! bounds are not sufficient.
+//! Bodies are compared as spheres; with an obstacle, each capsule is then compared as a sphere around its centre. The
+//! exact distance is computed only if these bounds are not sufficient.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::{FIRST_MOVING, NUM_BODIES};

@@ -20,8 +20,9 @@ pub const GRAVITY_M_S2: f64 = 9.81;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmDynamics {
     joints: [DhJoint; NUM_JOINTS],
-    /// Link 7 to flange, and flange to tcp, along z, m.
+    /// Distance from link 7 to the flange along z, m.
     flange_offset_m: f64,
+    /// Distance from the flange to the tcp along z, m.
     tcp_offset_m: f64,
     /// Links 1 to 7 in their frames (Denavit and Hartenberg); link 7 includes hand, fingers, camera and load.
     links: [LinkInertia; NUM_JOINTS],
@@ -40,7 +41,7 @@ pub(crate) struct TcpMotion {
     pub(crate) angular_acceleration: Vector3<f64>,
 }
 
-/// Rotations and positions of the links at a configuration, for several motions through it.
+/// Rotations of the links and the tcp at a configuration, for several motions through it.
 #[derive(Debug, Clone)]
 pub(crate) struct Placed {
     /// The axes of each link in its parent's frame.
@@ -95,7 +96,7 @@ impl ArmDynamics {
         self.of_motion(&self.placed(q), &zero, &zero, GRAVITY_M_S2).0
     }
 
-    /// The poses of the links at a configuration.
+    /// The rotations of the links and the tcp at a configuration.
     pub(crate) fn placed(&self, q: &JointVector) -> Placed {
         let parent_from_link: [Matrix3<f64>; NUM_JOINTS] = std::array::from_fn(|joint| {
             let (sin_a, cos_a) = self.joints[joint].twist();

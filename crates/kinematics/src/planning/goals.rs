@@ -63,7 +63,8 @@ pub(super) fn free_configurations(
     free_of(arm, checker, start, reaching)
 }
 
-/// The collision-free ones of these configurations, the fastest to reach from `start` first.
+/// The collision-free ones of these configurations, the fastest to reach from `start` first: at most [`MAX_KEPT`], all
+/// at least [`MIN_APART_RAD`] apart.
 ///
 /// # Errors
 /// There are no configurations, or all are blocked.

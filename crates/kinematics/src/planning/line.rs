@@ -60,7 +60,7 @@ pub fn checked_line(
 /// reaches its limit.
 const FOLLOWED_AGAIN: f64 = 0.98;
 
-/// The first blocked point of a path, as a fraction of it, and the obstacle.
+/// The start of the first blocked piece of a path, as a fraction of the path, and the reason.
 fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, String)> {
     let margin_mm = checker.margin_m() * 1e3;
     let why = |checker: &Checker<'_>, q: &JointVector| {

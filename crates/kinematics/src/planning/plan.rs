@@ -29,15 +29,16 @@ use crate::trajectory::Trajectory;
 pub struct PlanOptions {
     /// Seed of the random configurations. The same seed gives the same plan.
     pub seed: u64,
-    /// Minimum distance to obstacles, and between links that may not touch, m.
+    /// Minimum distance to obstacles, and between links that may not touch, at checked configurations, m. Between
+    /// these, nothing touches.
     pub margin_m: f64,
     /// Maximum length of a motion that is added to a tree at once, rad.
     pub step_rad: f64,
-    /// Maximum number of configurations that the search checks.
+    /// Maximum number of configurations that each search checks.
     pub max_checks: usize,
     /// Number of attempts to shorten a path.
     pub num_shortcuts: usize,
-    /// Number of searches if no straight motion leads to a goal; the cheapest path is used.
+    /// Maximum number of searches if no straight motion leads to a goal; the cheapest path is used.
     pub num_searches: usize,
 }
 
@@ -284,9 +285,9 @@ impl ArmGeometry {
     }
 }
 
-/// Maximum number of checks of a further search, unless [`FURTHER_CHECKS_RATIO`] allows more.
+/// Number of checks that a further search may do in addition to those of [`FURTHER_CHECKS_RATIO`].
 const MIN_FURTHER_CHECKS: usize = 1000;
-/// Maximum number of checks of a further search, as a multiple of the first search's.
+/// Number of checks that a further search may do, as a multiple of the first search's, without [`MIN_FURTHER_CHECKS`].
 const FURTHER_CHECKS_RATIO: usize = 2;
 /// Maximum length of a motion that a further search adds at once, rad. Shorter motions than those of the first search
 /// find narrower and faster paths.

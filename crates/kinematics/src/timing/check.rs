@@ -109,8 +109,8 @@ impl Worst {
 /// extreme to the other has twice the limit.
 const JUMP_JERK: f64 = 1.3;
 
-/// Times that are at most `max_secs` apart, including those just before and just after a jump of the path's third
-/// derivative or of the profile's jerk.
+/// Times that are at most `max_secs` apart, including those of each jump of the profile's jerk, and those just before
+/// and just after a jump of the path's third derivative.
 fn places_in_time(path: &RoundedPath, profile: &Profile, max_secs: f64) -> Vec<f64> {
     /// Time from a jump of the third derivative at which that derivative is evaluated, s.
     const BESIDE_SECS: f64 = 1e-7;

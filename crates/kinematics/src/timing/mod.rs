@@ -36,7 +36,7 @@ pub(crate) struct Timing {
     pub(crate) jerkless_secs: f64,
 }
 
-/// Maximum number of passes with lowered limits; most motions need three or four.
+/// Maximum number of passes, including the first, without lowered limits; most motions need three or four.
 const MAX_PASSES: usize = 6;
 /// Limits violated by less than this fraction are left to the stretching.
 const TOLERANCE: f64 = 1e-3;
@@ -49,7 +49,8 @@ const HEADROOM: f64 = 1.0005;
 /// Computes the timing of a path.
 ///
 /// # Errors
-/// [`KinematicsError::Trajectory`] if the arm cannot hold its own weight and load on the path.
+/// [`KinematicsError::Trajectory`] if the arm cannot hold its own weight and load on the path, or cannot continue at a
+/// point of it within its limits.
 pub(crate) fn time(path: &RoundedPath, limits: &MotionLimits<'_>) -> Result<Timing, KinematicsError> {
     let grid = Grid::new(path, limits)?;
     let mut tightening = Tightening::none(&grid);

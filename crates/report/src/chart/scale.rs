@@ -20,7 +20,8 @@ pub(super) struct FittedScale {
 }
 
 impl FittedScale {
-    /// Fits the axis to the finite values. With `from_zero`, a linear axis starts at zero unless a value is below zero.
+    /// Fits the axis to the finite values. With `from_zero`, a linear axis starts at zero unless a value is below zero;
+    /// with `tight`, it ends at the values instead of at ticks.
     pub(super) fn fit(scale: Scale, values: impl Iterator<Item = f64>, from_zero: bool, tight: bool) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for value in values.filter(|&value| is_drawable(scale, value)) {

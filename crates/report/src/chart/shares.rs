@@ -11,7 +11,7 @@ const BOTTOM: f64 = 24.0;
 /// Space for the number at the right, in pixels.
 const RIGHT: f64 = 64.0;
 const LETTER_WIDTH: f64 = 6.6;
-/// Possible starts of the axis, in percent: the largest one that is below all drawn values is used.
+/// Possible starts of the axis, in percent: the largest one that is not above any drawn value is used.
 const STARTS: [f64; 4] = [0.0, 50.0, 80.0, 90.0];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +45,8 @@ impl ShareChart {
         self
     }
 
-    /// Adds a fraction, its interval and its reference, all in percent. A fraction that is not finite is left out.
+    /// Adds a fraction, its interval and its reference, all in percent. A row whose fraction or interval is not finite
+    /// is left out, and so is a reference that is not finite.
     #[must_use]
     pub fn row(mut self, label: impl Into<String>, percent: f64, interval: [f64; 2], reference: Option<f64>) -> Self {
         if percent.is_finite() && interval.iter().all(|bound| bound.is_finite()) {

@@ -61,7 +61,7 @@ impl FrankaArm {
     ///
     /// # Errors
     /// [`RobotError::Unreachable`] if arm or hand does not answer, [`RobotError::Device`] for another version of the
-    /// protocol, [`RobotError::Configuration`] if the kernel refuses the requested real-time scheduling.
+    /// protocol, [`RobotError::NoRealTime`] if the kernel refuses the requested real-time scheduling.
     pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
         if scheduling == Scheduling::RealTime {
             check_real_time()?;

@@ -14,7 +14,7 @@ pub enum Scheduling {
 /// Checks in a short thread whether the kernel allows this process to use `SCHED_FIFO`.
 ///
 /// # Errors
-/// [`RobotError::Configuration`] with the remedy.
+/// [`RobotError::NoRealTime`] with the remedy.
 pub fn check_real_time() -> Result<()> {
     std::thread::spawn(enter).join().unwrap_or_else(|_| Err(refused("a thread that panicked")))
 }

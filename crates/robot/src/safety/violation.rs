@@ -22,7 +22,7 @@ pub enum Violation {
         /// Joint number, 1 to 7.
         joint: usize,
     },
-    /// A joint leaves its range or is too fast.
+    /// The position, velocity, acceleration or jerk of a joint is outside its limits.
     #[error(
         "at {time_secs:.3} s the {quantity} of joint {joint} is {found:.4} {unit}, allowed is {min:.4} to {max:.4}"
     )]
@@ -37,7 +37,7 @@ pub enum Violation {
         max: f64,
         unit: &'static str,
     },
-    /// The tcp is too fast.
+    /// The velocity, acceleration or jerk of the tcp exceeds its limit.
     #[error("at {time_secs:.3} s the {quantity} of the tcp is {found:.3} {unit}, at most {max:.3} are allowed")]
     Cartesian {
         time_secs: f64,
@@ -61,7 +61,7 @@ pub enum Violation {
         min_m: f64,
         max_m: f64,
     },
-    /// Hand, wrist or elbow come too close to the table.
+    /// Finger tips, hand, wrist or elbow come too close to the table.
     #[error("at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are required")]
     Table {
         time_secs: f64,

@@ -25,8 +25,9 @@ const MAX_FINGERTIP_MM: f64 = 100.0;
 const MIN_FINGERTIP_MM: f64 = 0.1;
 /// Largest force that the hand can hold permanently, N.
 const MAX_FORCE_N: f64 = 70.0;
-/// Default and largest extent of a part from its grasp, mm.
+/// Default extent of a part from its grasp, mm.
 const PART_RADIUS_MM: f64 = 60.0;
+/// Largest extent of a part from its grasp, mm.
 const MAX_PART_MM: f64 = 500.0;
 /// Payload of a Panda, kg.
 const MAX_LOAD_KG: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! A workcell file: the robot, its load, the camera, the table, and the workspace.
+//! A workcell file: the robot, its load, the camera, the table, the workspace, look-out poses, obstacles and places.
 //!
 //! ```toml
 //! format = 1

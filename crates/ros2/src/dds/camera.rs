@@ -21,8 +21,8 @@ type Taken = (Header, Result<RgbImage, String>);
 /// such as a simulation's or a recording's; then the time of arrival is used.
 const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 
-/// The part of a camera's address after `ros2:`: `TOPIC?compressed&reliable&domain=7&rmw=cyclonedds&loopback`, with
-/// optional options.
+/// The part of a camera's address after `ros2:`: a topic, and optionally any of the options in
+/// `TOPIC?compressed&reliable&domain=7&loopback`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TopicAddress {
     /// The topic.

@@ -13,7 +13,7 @@ use crate::messages::JointState;
 
 pub(super) type Joints = SVector<f64, 7>;
 
-/// The names of an arm's topics and actions.
+/// An arm's geometry, and the names of its topics, actions and joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmConfig {
     /// The arm's links, limits and hand.

@@ -87,6 +87,7 @@ impl<T: Cdr + 'static> Subscription<T> {
     ///
     /// # Errors
     /// [`RosError::Malformed`] for an invalid message of this type; the next call continues with the next message.
+    /// Errors reported by the network.
     pub fn receive(&self, timeout: Duration) -> Result<Option<Received<T>>, RosError> {
         let Some(taken) = wait_for(self.inner.async_take(), Some(Instant::now() + timeout)) else { return Ok(None) };
         let arrived = Instant::now();

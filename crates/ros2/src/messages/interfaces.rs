@@ -47,7 +47,7 @@ structure! {
         mark_height_mm: f64,
         /// Maximum time for training; 0 for no limit.
         time_budget_secs: f64,
-        /// Seed of the training samples.
+        /// Seed of the training samples; 0 means 1.
         seed: u64,
         /// Whether the node then uses the model for detection.
         use_it: bool,
@@ -63,7 +63,7 @@ structure! {
         message: String,
         /// Path of the grasp model.
         model_path: String,
-        /// Duration of the teaching.
+        /// Duration of teaching.
         seconds: f64,
     }
 }

@@ -20,7 +20,7 @@ structure! {
 impl Copy for Time {}
 
 impl Time {
-    /// Converts from the system's clock; clamped to the range of a signed 32-bit number of seconds.
+    /// Converts from the system's clock. Times before 1970 become 1970; the seconds are at most 2³¹ - 1.
     pub fn from_system(time: SystemTime) -> Self {
         let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX), nanosec: since.subsec_nanos() }

@@ -20,7 +20,7 @@ pub struct CloseLook {
 }
 
 impl CloseLook {
-    /// Whether the pose is good enough to be compared with rivals; other poses are refused. Chosen by hand, for time.
+    /// Whether the pose is good enough for a comparison with rivals; others are refused. Chosen by hand to save time.
     pub(crate) fn is_plausible(&self) -> bool {
         self.fit >= 0.45 && self.bare < 0.25 && self.no_rim < 0.35
     }

@@ -49,7 +49,7 @@ enum Level {
     Windows(Box<Windows>),
 }
 
-/// Levels of more pixels are computed window by window. Chosen by hand, for time: three megapixels.
+/// Levels of more pixels are computed window by window. Chosen by hand to save time: three megapixels.
 const MAX_WHOLE: usize = 3 << 20;
 
 impl GradientField {

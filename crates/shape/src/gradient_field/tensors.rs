@@ -79,7 +79,7 @@ const PAD: usize = 2;
 /// Gain of the 5-tap binomial filter in both directions. Derived: 16 × 16.
 const BLUR_GAIN: f32 = 256.0;
 
-/// Rows that one thread takes at a time. Chosen for time; it does not change results.
+/// Rows that one thread takes at a time. Chosen to save time; it does not change results.
 pub(super) const BAND: usize = 64;
 
 /// `[tr, v.x, v.y, 0]` of every pixel, row by row.

@@ -19,13 +19,13 @@ use super::tensors::{Planes, structure_tensors, tensors_of_part};
 use crate::config::GradientConfig;
 use crate::parallel;
 
-/// Side of a cell, in level pixels. Chosen by hand, for time.
+/// Side of a cell, in level pixels. Chosen by hand to save time.
 const CELL: usize = 128;
-/// Margins of windows; the smallest that covers the read area is used. Chosen by hand, for time.
+/// Margins of windows; the smallest that covers the read area is used. Chosen by hand to save time.
 const MARGINS: [usize; 5] = [96, 160, 256, 384, 512];
 /// Added to the requested area, for interpolation between pixels.
 const LEEWAY: f64 = 2.0;
-/// Number of rows from whose pixels the noise is estimated, and the total number of pixels. Chosen by hand, for time.
+/// Number of rows from whose pixels the noise is estimated, and total number of pixels. Chosen by hand to save time.
 const QUIET_ROWS: usize = 32;
 const QUIET_PIXELS: usize = 4096;
 

@@ -130,14 +130,14 @@ const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
 /// hand, not measured.
 const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
 /// Starts that are climbed together, and climbed starts that are followed to full resolution together. Chosen by hand
-/// for time.
+/// to save time.
 const STARTS_AT_ONCE: usize = 64;
 const FOLLOWED_AT_ONCE: usize = 8;
 /// Further starts are followed as long as the agreement of one of the last is at least this. Chosen by hand, below
 /// every right pose on generated parts except the lowest twentieth.
 const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the largest ratio of their
-/// responses. Chosen by hand, for time: of ten photographed clips in a picture all are found.
+/// responses. Chosen by hand to save time: of ten photographed clips in a picture all are found.
 const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
@@ -457,7 +457,7 @@ fn places_in_photo(
     photo: &GradientField,
     config: &SearchConfig,
 ) -> Vec<PlanarSimilarity> {
-    /// Number of places that are refined. Chosen by hand, for time.
+    /// Number of places that are refined. Chosen by hand to save time.
     const MAX_PLACES: usize = 48;
     const SAME_LOG_SCALES: [f64; 2] = [-0.02, 0.02];
     const REACH: Reach = Reach { shift_px: 8.0, turn_rad: 0.1, log_scale: 0.02 };

@@ -43,7 +43,7 @@ pub(crate) const PITCH: usize = 2;
 pub(crate) const SPREAD: usize = 2;
 
 /// Places that are summed together; a table ends with as many zeros, so that the last block may be read whole. Chosen
-/// for time; it does not change results.
+/// to save time; it does not change results.
 pub(crate) const BLOCK: usize = 128;
 
 /// The table of direction `k` with the pixels whose x and y have these remainders modulo [`PITCH`].

@@ -15,7 +15,7 @@ use crate::parallel;
 use crate::search::bank::Bank;
 use crate::search::responses::{BLOCK, FULL, Responses};
 
-/// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen for time; it does not change results.
+/// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen to save time; it does not change results.
 const STRETCH: usize = 1024;
 /// Reads summed in bytes before they are carried into 16 bits. Derived.
 const READS_PER_BYTE: usize = 255 / FULL as usize;

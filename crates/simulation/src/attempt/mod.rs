@@ -47,6 +47,7 @@ impl Default for AttemptConfig {
 /// Cartesian space. Joint motions have limits for each joint only, and at the pace of rehearsals they rotate the hand
 /// at up to twice that velocity.
 const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
+/// Limit of the hand's angular acceleration in rehearsals, rad/s².
 const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
 
 impl Workcell {
@@ -143,7 +144,7 @@ impl Workcell {
     /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
     ///
     /// # Errors
-    /// An error if the arm cannot reach the first look-out pose.
+    /// An error if the arm cannot reach the first look-out pose; the errors of [`Workcell::reset`].
     pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
         let start = self.random_start(config, seed)?;
         self.reset(&start)

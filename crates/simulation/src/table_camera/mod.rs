@@ -166,7 +166,7 @@ impl TableCamera {
     /// The next frame; `None` at the end of the sequence.
     ///
     /// # Errors
-    /// As for [`Renderer::image`].
+    /// As for [`Data::forward`] and [`Renderer::image`].
     pub fn next_view(&mut self) -> Result<Option<TableView>> {
         let secs = self.number as f64 / self.config.fps;
         if self.config.duration_secs.is_some_and(|duration| secs >= duration) {

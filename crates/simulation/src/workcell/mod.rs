@@ -62,7 +62,8 @@ impl Workcell {
     /// Builds the scene, its physics and the wrist camera's renderer.
     ///
     /// # Errors
-    /// `Model` if MuJoCo rejects the scene, `Rendering` without OpenGL, `Library` for the wrong libmujoco.
+    /// `Model` if MuJoCo rejects the scene, `Rendering` without OpenGL, `Library` for the wrong libmujoco,
+    /// `Configuration` for a lens whose model does not cover the corners of its own picture.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
 

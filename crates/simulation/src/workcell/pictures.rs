@@ -17,7 +17,8 @@ impl Workcell {
     /// The wrist camera's present picture.
     ///
     /// # Errors
-    /// As for [`Renderer::image`].
+    /// As for [`crate::Data::forward`] and [`Renderer::image`]; [`SimulationError::Configuration`] for a lens whose
+    /// model does not cover the corners of its own picture.
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // After a step, body positions are one period behind the joints.
         self.data.forward()?;
@@ -43,7 +44,7 @@ impl Workcell {
     /// demonstrations and test images.
     ///
     /// # Errors
-    /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
+    /// [`SimulationError::Configuration`] for a pose that the arm cannot reach; and the errors of [`Self::wrist_view`].
     pub fn view_from(&mut self, base_from_camera: &Isometry3<f64>) -> Result<CameraView> {
         self.reach_camera_pose(base_from_camera)?;
         self.wrist_view()
@@ -67,7 +68,7 @@ impl Workcell {
     /// A picture of the whole workcell by the outside camera, in its present state.
     ///
     /// # Errors
-    /// As for [`Renderer::new`].
+    /// As for [`Renderer::new`] and [`Renderer::image`].
     pub fn scene_image(&mut self, render: RenderConfig) -> Result<RgbImage> {
         let mut renderer = Renderer::new(self.data.model(), render)?;
         renderer.image(&mut self.data, self.scene_camera)
@@ -77,7 +78,7 @@ impl Workcell {
     /// an opening (m), for showing plans.
     ///
     /// # Errors
-    /// As for [`Workcell::scene_image`].
+    /// As for [`crate::Data::forward`] and [`Renderer::image`].
     pub fn scene_image_at(
         &mut self,
         renderer: &mut Renderer,

@@ -24,7 +24,7 @@ pub struct TrainingConfig {
     pub schedule: OneCycle,
     /// Weight decay; decoupled from the gradients in AdamW.
     pub weight_decay: f64,
-    /// Maximum norm of the gradient; larger gradients are scaled down.
+    /// Maximum norm of each parameter's gradient; larger gradients are scaled down.
     pub max_gradient_norm: f32,
     /// When and on how many samples to validate.
     pub validation: ValidationConfig,

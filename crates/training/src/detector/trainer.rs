@@ -30,8 +30,8 @@ pub struct Trained {
 /// every step and every validation and may stop the run, which then keeps the best checkpoint so far.
 ///
 /// # Errors
-/// An invalid setting, a loss that is not finite, a batch that the network rejects, or an end before the first
-/// validation.
+/// An invalid setting, a loss that is not finite, a batch that the network rejects, an end before the first validation,
+/// and the errors of `examine`.
 pub fn train(
     detector: GeneralizedRcnn,
     config: &TrainingConfig,

@@ -68,7 +68,7 @@ pub struct Validation {
     pub median_error_degrees: f64,
     /// Samples without the part.
     pub negatives: usize,
-    /// Number of negatives with a detection whose score is at least as high as that of nine in ten hits.
+    /// Number of negatives with a detection whose score is at least the one that nine in ten hits reach.
     pub false_alarms: usize,
 }
 

@@ -20,7 +20,7 @@ pub struct OrientationTraining {
     pub schedule: OneCycle,
     /// AdamW's decoupled weight decay.
     pub weight_decay: f64,
-    /// Maximum norm of the gradient; larger gradients are scaled down.
+    /// Maximum norm of each parameter's gradient; larger gradients are scaled down.
     pub max_gradient_norm: f32,
     /// The network's target for an angle.
     pub labels: Labels,

@@ -70,7 +70,8 @@ const NUM_CLASS_CROPS: usize = 960;
 /// is, and its errors show whether it is useful.
 ///
 /// # Errors
-/// An invalid setting, a demonstration without a grasp line, a loss that is not finite.
+/// An invalid setting, a demonstration without a grasp line, pretrained parameters of another network, a loss that is
+/// not finite.
 pub fn teach(
     demonstrations: &[Demonstration],
     network: &OrientationConfig,

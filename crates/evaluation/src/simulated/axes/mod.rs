@@ -1,7 +1,7 @@
 //! Axes along which the paper's protocol is made more difficult, one at a time, and grasps under errors.
 //!
 //! ```text
-//! AxesEvaluation ─ units: teachings (as in the protocol, and from jittered marks), pictures of a part and axis, attempts
+//! AxesEvaluation ─ units: teaching runs (as in the protocol, and from jittered marks), pictures of a part and axis, attempts
 //!       │                                    │
 //!       │              each picture rendered once, searched by every model, with the check and by the network alone
 //!       └─ Store ─ AxesSummary (the paper's parts and the held-out ones separately) ─ Markdown, JSON, page

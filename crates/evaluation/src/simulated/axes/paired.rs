@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use crate::statistics::{Share, wilson_interval};
 
-/// Two-sided 95 % quantile of the normal distribution: a test at the 5 % level.
+/// Number of standard deviations on both sides of the mean that contain 95 % of a normal distribution: a test at the
+/// 5 % level.
 const Z_TWO_SIDED_5_PERCENT: f64 = 1.959_963_984_540_054;
 /// 80 % quantile of the normal distribution.
 const Z_POWER_80_PERCENT: f64 = 0.841_621_233_572_914;

@@ -28,7 +28,7 @@ pub struct AxesSummary {
     pub grasp_settings: GraspSettings,
     /// Number of remaining units.
     pub remaining: usize,
-    /// Worker seconds of the results, including the teachings.
+    /// Worker seconds of the results, including teaching.
     pub seconds: Seconds,
     /// The paper's parts, and separately the held-out parts; groups without parts are missing.
     pub groups: Vec<GroupSummary>,
@@ -37,7 +37,7 @@ pub struct AxesSummary {
 /// Worker seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Seconds of all teachings of the measured models.
+    /// Seconds of all teaching runs of the measured models.
     pub teaching: f64,
     /// Seconds of pictures: rendering and detection.
     pub pictures: f64,
@@ -224,7 +224,7 @@ fn axes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) ->
     Ok(figures)
 }
 
-/// The records of each part: `None` if the teaching gave no model; no entry if the part was not measured yet.
+/// The records of each part: `None` if teaching gave no model; no entry if the part was not measured yet.
 fn records<'o>(
     evaluation: &AxesEvaluation,
     objects: &[&'o str],
@@ -403,7 +403,7 @@ fn grasp_figures(condition: GraspCondition, model: ModelKind, by_part: &[(&str, 
     }
 }
 
-/// The time of the teachings of the measured models, each counted once.
+/// The time of the teaching runs of the measured models, each counted once.
 fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
     let mut taught: Vec<(ModelKind, Marks)> =
         evaluation.models.iter().map(|model| (model.taught_as(), Marks::Shipped)).collect();

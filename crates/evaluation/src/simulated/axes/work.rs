@@ -43,7 +43,7 @@ impl AxesEvaluation<'_> {
     /// the next run.
     ///
     /// # Errors
-    /// The store cannot be read. A teaching without a model is not an error.
+    /// The store cannot be read. A teaching run without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<RunEnd> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -167,7 +167,7 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     let workcell =
         |errors: fn(u64) -> AttemptErrors| RehearsalErrors { of_workcell: Some(errors), ..RehearsalErrors::default() };
     match condition {
-        // Jittered marks are an error of the teaching.
+        // Jittered marks are an error of teaching.
         GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::default(),
         GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::default() },
         GraspCondition::HandEye => workcell(AttemptErrors::hand_eye),

@@ -7,7 +7,7 @@
 //! the axes' pictures  ├─ picture and its camera ───┘
 //! parts of other sizes┘
 //! ```
-//! Teachings and results are in the same store as those of the axes.
+//! Models and results are in the same store as those of the axes.
 
 mod files;
 mod records;

@@ -58,7 +58,7 @@ impl CamerasEvaluation<'_> {
     /// Runs the remaining units until `is_interrupted` is true.
     ///
     /// # Errors
-    /// The first error of a unit; or the store cannot be read. A teaching without a model is not an error.
+    /// The first error of a unit; or the store cannot be read. A teaching run without a model is not an error.
     pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<()> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
@@ -77,7 +77,7 @@ impl CamerasEvaluation<'_> {
         self.store.read_made_with(&file(cell, set), &self.settings())
     }
 
-    /// Whether the teaching of a cell gave no model.
+    /// Whether teaching for a cell gave no model.
     pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
         cell.is_without_model(Marks::InPlanView, self.store)
     }

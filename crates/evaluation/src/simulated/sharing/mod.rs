@@ -16,7 +16,7 @@
 //! number of units. Records contain the SHA-256 of the program in addition to the settings of the ordinary run. The
 //! shipped demonstrations are compiled into the program, so its hash includes them.
 //!
-//! Slurm assigns the units to processes.
+//! Slurm, or a person, assigns the units to processes.
 
 mod checking;
 mod doing;

@@ -39,7 +39,7 @@ impl UnitKind {
         }
     }
 
-    /// Whether units of this kind render pictures: all except teachings, which use shipped photos.
+    /// Whether units of this kind render pictures: all except teaching runs, which use shipped photos.
     pub fn is_simulated(self) -> bool {
         self != Self::Teach
     }
@@ -77,7 +77,7 @@ pub struct ListedUnit<'a> {
     pub(super) work: Work<'a>,
 }
 
-/// All units: teachings, pictures, grasps, grasps without the check, speed. Each unit comes after its dependencies.
+/// All units: teaching runs, pictures, grasps, grasps without the check, speed. Each unit comes after its dependencies.
 pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified: bool) -> Vec<ListedUnit<'a>> {
     let mut networks: Vec<ModelKind> = Vec::new();
     for network in models.iter().map(|model| model.taught_as()) {

@@ -66,6 +66,8 @@ pub struct FailedUnit {
 }
 
 impl Watch {
+    /// Watches the units in a folder.
+    ///
     /// # Errors
     /// The folder has no units.
     pub fn new(folder: &Path) -> Result<Self> {

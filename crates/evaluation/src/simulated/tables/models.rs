@@ -1,4 +1,4 @@
-//! Tables of the models: their structure, the cost of teaching them, and failed teachings.
+//! Tables of the models: their structure, the cost of teaching them, and failed teaching runs.
 
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
@@ -106,7 +106,7 @@ fn description(model: ModelKind) -> [&'static str; 5] {
     }
 }
 
-/// Teachings that gave no model.
+/// Teaching runs that gave no model.
 pub(super) fn not_taught(summary: &Summary) -> Titled {
     let mut table = Table::new(vec![Column::text("part"), Column::text("model"), Column::text("why")]);
     for cell in &summary.cells {

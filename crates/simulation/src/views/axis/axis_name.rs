@@ -10,7 +10,8 @@ use crate::error::{Result, SimulationError};
 pub enum Axis {
     /// The camera is at 0.75 to 1.3 times its usual height.
     Height,
-    /// The camera is tilted by 5 to 20 degrees about a random horizontal axis and points at the part.
+    /// The camera is tilted by 5 to 20 degrees about a random horizontal axis and aimed at the part or slightly beside
+    /// it.
     Tilt,
     /// Another object covers 10 to 40 percent of the part's visible area.
     Covered,

@@ -15,7 +15,7 @@ use crate::workcell::Workcell;
 pub struct InstanceTruth {
     /// Pose and grasp of the instance.
     pub grasp: GraspTruth,
-    /// Number of the instance's pixels in the picture, as a fraction of their number with nothing else on the table.
+    /// Number of the instance's pixels in the picture, as a fraction of their number with all distractors hidden.
     pub visible_share: f64,
 }
 
