@@ -1,7 +1,7 @@
 // Changes of marks: undoable, saved at once.
 
 import { api, isLost, present } from "./api.js";
-import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, placedAt } from "./geometry.js";
+import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, nearestWithin, placedAt } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
@@ -110,6 +110,7 @@ export function boxDrawn() {
 export function placeGripper(point) {
   const part = region() ?? boxPolygon([0, 0, ...size()]);
   setGripper(placedAt(point, part));
+  image().placed = { point, grasp: JSON.stringify(marks().grasp, round) };
   Object.assign(state, { selected: "grasp", tool: "select" });
   commit();
 }
@@ -150,6 +151,22 @@ function snapBox(marks) {
   if (Math.max(x1 - bx1, y1 - by1, bx2 - x2, by2 - y2) > most) setBox([x1 - room, y1 - room, x2 + room, y2 + room]);
 }
 
+/** Places the gripper again after a stroke changed the outline: one that was placed by a click and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
+function followOutline(target) {
+  const { grasp, outline } = target.marks;
+  if (!grasp) return false;
+  const { placed } = target;
+  const isPlaced = placed?.grasp === JSON.stringify(grasp, round);
+  const { center, length } = gripperOf(grasp);
+  const point = isPlaced ? placed.point : center;
+  const isBeside = !isWithin(center, outline);
+  if (!isPlaced && !isBeside) return false;
+  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
+  setGripper(placedAt(nearest, outline, isPlaced ? null : length));
+  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round) };
+  return isBeside;
+}
+
 /** Asks the server for the outline of the object in the box. `quietly`: without notes, if the user did not ask for it. */
 export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   const target = image();
@@ -178,6 +195,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
         target.drawnBox = box;
         snapBox(target.marks);
       }
+      const hasMoved = strokes ? followOutline(target) : false;
       commit();
       target.strokesOf.set(target.committed, strokes);
       const last = strokes?.at(-1);
@@ -187,6 +205,8 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
         toast("This place is inside the part. An outline is a single line without holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {
         toast("This place is not connected with the part. Draw from there to the part as well, or draw the outline by hand.");
+      } else if (hasMoved) {
+        toast("The gripper was not on the part any more: it was moved there.", { text: "Undo", run: undo });
       } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
         toast("“Out” removed much of the outline.", { text: "Undo", run: undo });
       }

@@ -37,12 +37,34 @@ export function boundsOf(points) {
 
 export const areaOf = (polygon) => Math.abs(polygon.reduce((sum, [x, y], i) => sum + polygon.at(i - 1)[0] * y - x * polygon.at(i - 1)[1], 0)) / 2;
 
+/** The point of the edge from `a` to `b` that is nearest to a point. */
+function footOn(point, a, b) {
+  const along = sub(b, a);
+  return add(a, times(along, clamp(dot(sub(point, a), along) / (dot(along, along) || 1), 0, 1)));
+}
+
+/** Distance from a point to that point. */
+export const distanceToEdge = (point, a, b) => norm(sub(point, footOn(point, a, b)));
+
+/** Distance from a point to a polygon's outline. */
+export const distanceTo = (polygon, point) => Math.min(...polygon.map((to, i) => distanceToEdge(point, polygon.at(i - 1), to)));
+
 /** Whether a point is inside a polygon: a ray to the right crosses the polygon's edges an odd number of times. */
 export function isWithin([x, y], polygon) {
   return polygon.filter(([bx, by], i) => {
     const [ax, ay] = polygon.at(i - 1);
     return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
   }).length % 2 === 1;
+}
+
+/** A point inside a polygon close to a point beside it: from the nearest point of the outline inwards, half as far as the polygon extends there. */
+export function nearestWithin(polygon, point, depth) {
+  const foot = polygon.map((to, i) => footOn(point, polygon.at(i - 1), to)).reduce((best, p) => (norm(sub(p, point)) < norm(sub(best, point)) ? p : best));
+  const way = sub(foot, point);
+  const inwards = times(way, 1 / (norm(way) || 1));
+  let inside = 0;
+  while (inside < depth && isWithin(add(foot, times(inwards, inside + 1)), polygon)) inside += 1;
+  return add(foot, times(inwards, inside / 2));
 }
 
 /** Clips a polygon at the line `dot(p, normal) = bound` and keeps the part below it. */

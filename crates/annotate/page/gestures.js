@@ -1,6 +1,6 @@
 // Gestures of mouse, pen and fingers on the photo.
 
-import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
+import { add, direction, distanceTo, distanceToEdge, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX } from "./overlay.js";
@@ -154,12 +154,7 @@ function draggingVertex(vertex) {
 /** A new point where the outline's line was grabbed. */
 function draggingLine(from) {
   const { outline } = marks();
-  const distance = (i) => {
-    const [a, b] = [outline[i], outline[(i + 1) % outline.length]];
-    const along = sub(b, a);
-    const t = Math.min(Math.max(dot(sub(from, a), along) / (dot(along, along) || 1), 0), 1);
-    return norm(sub(from, add(a, times(along, t))));
-  };
+  const distance = (i) => distanceToEdge(from, outline[i], outline[(i + 1) % outline.length]);
   const nearest = outline.reduce((best, _, i) => (distance(i) < distance(best) ? i : best), 0);
   outline.splice(nearest + 1, 0, from);
   return draggingVertex(nearest + 1);
@@ -196,10 +191,22 @@ function nearestVertex(place) {
   return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
 }
 
+/** The mark that is dragged from a place: between the jaws it is the gripper if its line is closer than the outline, whose reach covers thin parts. */
+function takenAt(target, from) {
+  const taken = target.closest?.("[data-kind]");
+  const { grasp, outline } = marks();
+  if (taken?.dataset.kind !== "outline" || !grasp) return taken;
+  const gripper = gripperOf(grasp);
+  const along = direction(gripper.angle);
+  const [t, s] = [along, quarter(along)].map((axis) => Math.abs(dot(sub(from, gripper.center), axis)));
+  const isBetween = t <= gripper.length / 2 && s <= gripper.width / 2;
+  return isBetween && s < distanceTo(outline, from) ? overlay.querySelector("[data-kind=grasp][data-body]") : taken;
+}
+
 /** The action begun by a pressed pointer. */
 function begin(event, at) {
   const from = toPhoto(at);
-  const taken = event.target.closest?.("[data-kind]");
+  const taken = isMarking() && state.tool === "select" ? takenAt(event.target, from) : event.target.closest?.("[data-kind]");
   if (event.button === 1 || spaceHeld) return panning();
   if (isChoosingRegion()) return drawingRegion(from);
   if (!isMarking()) return panning();

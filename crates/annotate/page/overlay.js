@@ -171,7 +171,7 @@ function drawDifferences(refusal, i) {
 /** Text about one of several grasps, with its number in the picture and in the list. */
 export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : text);
 
-/** A detected grasp: drawn like a marked one, but not draggable. */
+/** A detected grasp: drawn like a marked one, but not draggable. Returns its tag: key, text, the part's bounds on the screen, and its group. */
 function drawDetection(detection, i, count, detections) {
   const touches = isFound(detection) && touchedBy(detection, detections).length;
   const parent = group(`found${i}`, isFound(detection) ? (touches ? "touching" : "") : "refused");
@@ -187,8 +187,29 @@ function drawDetection(detection, i, count, detections) {
     element(`found${i}/pad${j}`, "path", { class: "jaw", d: path(pad) }, gripper);
     element(`found${i}/arrow${j}`, "path", { class: "arrow", d: path(arrow) }, gripper);
   });
-  const [x, y] = toScreen(boundsOf(outline ?? boxPolygon(box)).slice(0, 2));
-  element(`found${i}/tag`, "text", { class: "tag", x, y: y - 6 }, parent).textContent = numbered(detection.score.toFixed(2), i, count);
+  return [`found${i}/tag`, numbered(detection.score.toFixed(2), i, count), boundsOf((outline ?? boxPolygon(box)).map(toScreen)), parent];
+}
+
+const TAG_HEIGHT_PX = 18;
+const TAG_GAP_PX = 6;
+
+/** Draws the tags of detections, the best first: each beside its part, at the first place without another tag. */
+function drawTags(tags) {
+  const taken = [];
+  for (const [key, text, [x1, y1, x2, y2], parent] of tags) {
+    const tag = element(key, "text", { class: "tag" }, parent);
+    tag.textContent = text;
+    const width = tag.getComputedTextLength() + TAG_GAP_PX;
+    const middle = (y1 + y2 + TAG_HEIGHT_PX) / 2;
+    const places = [[x1, y1 - TAG_GAP_PX], [x2 - width, y1 - TAG_GAP_PX], [x1, y2 + TAG_HEIGHT_PX], [x2 - width, y2 + TAG_HEIGHT_PX], [x2 + TAG_GAP_PX, middle], [x1 - width, middle], [(x1 + x2 - width) / 2, middle]];
+    // Where parts lie closely on top of each other, tags are stacked.
+    for (let row = 1; row <= tags.length; row += 1) places.push([x1, y1 - TAG_GAP_PX - row * TAG_HEIGHT_PX]);
+    const isFree = ([x, y]) => taken.every(([left, bottom, other]) => x + width <= left || left + other <= x || Math.abs(bottom - y) >= TAG_HEIGHT_PX);
+    const [x, y] = places.find(isFree) ?? places[0];
+    taken.push([x, y, width]);
+    tag.setAttribute("x", x.toFixed(1));
+    tag.setAttribute("y", y.toFixed(1));
+  }
 }
 
 export function renderOverlay() {
@@ -199,10 +220,11 @@ export function renderOverlay() {
     const detections = isLive() ? inLive : trialPicture()?.detections;
     const shown = detections?.filter((d, i) => isFound(d) || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
     // Worst first, so that the best is on top.
-    shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => {
+    const tags = shown.map((d, i) => [d, i]).reverse().map(([d, i]) => {
       if (d.refusal && !isFound(d) && state.showDifferences) drawDifferences(d.refusal, i);
-      drawDetection(d, i, shown.length, detections);
+      return drawDetection(d, i, shown.length, detections);
     });
+    drawTags(tags.reverse());
   } else if (image() && !isLive()) {
     const correcting = state.tool === "select" && isMarking();
     const { box, outline, grasp } = marks();

@@ -151,6 +151,25 @@ fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
 }
 
 #[test]
+fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
+    let served = Served::of_photo(folder_of(&["rod.png", "other.png", "second.png"]), "rod.png");
+    let files = || std::fs::read_dir(served.folder.path()).unwrap().count();
+    let before = files();
+    let tried = served.ask("POST", "/api/trial-pictures?name=other.png", &photo_png()).json();
+    assert_eq!(tried["name"], "other.png");
+    assert_eq!(names(&session(&served)["others"]), ["second.png"], "it is not offered again");
+    let photo = served.ask("POST", "/api/images?name=second.png", &photo_png()).json();
+    assert_eq!(photo["name"], "second.png");
+    assert_eq!(session(&served)["others"], json!([]));
+    // The project's file and no copies.
+    assert_eq!(files(), before + 1);
+    // Another picture of the same name is copied.
+    std::fs::write(served.folder.path().join("third.png"), b"another content").unwrap();
+    served.ask("POST", "/api/trial-pictures?name=third.png", &photo_png()).json();
+    assert_eq!(names(&session(&served)["others"]), ["third.png"]);
+}
+
+#[test]
 fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     let served = Served::of_start(tempfile::tempdir().unwrap());
     let start = session(&served)["start"].clone();

@@ -41,6 +41,14 @@ impl State {
 }
 
 impl Session {
+    /// The number of the offered picture with this name and content: a picture of the folder that was chosen or
+    /// dropped on the page is used where it lies, without a copy.
+    pub(super) fn same_other(&self, name: &str, bytes: &[u8]) -> Option<usize> {
+        let mut state = self.state();
+        let other = state.others().into_iter().find(|other| other.name == name)?;
+        std::fs::read(&state.offered[other.id]).is_ok_and(|content| content == bytes).then_some(other.id)
+    }
+
     /// Another picture of the folder.
     ///
     /// # Errors
@@ -102,13 +110,17 @@ impl Session {
         Ok(state.trial_picture_view(id))
     }
 
-    /// Adds a photo of the part from the page; it is written beside the first photo under an unused name.
+    /// Adds a photo of the part from the page; it is written beside the first photo under an unused name, unless it
+    /// lies there already.
     ///
     /// # Errors
     /// The bytes are not a picture, or the file cannot be written.
     pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
         let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
         Picture::check(bytes, shown)?;
+        if let Some(id) = self.same_other(shown, bytes) {
+            return self.add_photo(id);
+        }
         let extension = Path::new(shown).extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let mut state = self.state();
         let path = free_name(&self.home, shown, if extension.is_empty() { "png" } else { &extension });

@@ -35,7 +35,7 @@ impl Session {
         Ok(self.state().trial_picture(id)?.clone())
     }
 
-    /// Adds a picture from the page; it is kept in a folder of this session.
+    /// Adds a picture from the page; it is kept in a folder of this session, unless it is one of the project's folder.
     ///
     /// # Errors
     /// The bytes are not a picture, or there are more pictures than a session keeps.
@@ -44,9 +44,13 @@ impl Session {
         if count >= MAX_TRIAL_PICTURES {
             return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
         }
+        let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
+        if let Some(id) = self.same_other(name, bytes) {
+            return self.add_other_trial(id);
+        }
         // The given name is for display; the file gets its own name.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
-        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
+        let shown: String = name.chars().take(MAX_LABEL_CHARS).collect();
         // Held until the picture is written, so that its name is taken when the next one is chosen.
         let mut state = self.state();
         let folder = self.uploads(&state);

@@ -155,3 +155,78 @@ fn a_stroke_that_takes_much_of_the_outline_is_told_and_taken_back() {
     assert_eq!(page.saved().outline.unwrap().area(), area, "undone from the note");
     page.assert_quiet();
 }
+
+/// A dark rod of this thickness on a light table.
+fn rod(thickness: u32) -> RgbImage {
+    RgbImage::from_fn(640, 480, |x, y| {
+        let grain = ((x * 7 + y * 13) % 7) as u8;
+        let is_rod = (200..420).contains(&x) && (240..240 + thickness).contains(&y);
+        if is_rod { Rgb([60 + grain, 74, 90]) } else { Rgb([200 + grain, 198, 190]) }
+    })
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
+    let folder = tempfile::tempdir().unwrap();
+    rod(7).save(folder.path().join("photo.png")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    let corners = [[194.0, 225.0], [300.0, 250.0], [426.0, 262.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&corners).unwrap();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.browser.drag(&[page.on_screen([300.0, 243.5])]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    // Whether the outline or nothing is selected: its reach covers the whole rod.
+    for step in ["#do-outline h2", "#do-grasp h2"] {
+        page.click(step);
+        page.settle();
+        let before = page.saved();
+        let middle = before.grasp.unwrap().center();
+        let way = [0.0, 20.0, 40.0].map(|dx| page.on_screen([middle.x + dx, middle.y]));
+        page.browser.drag(&way).unwrap();
+        let after = page.saved();
+        let moved = after.grasp.unwrap().center() - middle;
+        assert!((moved.x - 40.0).abs() < 2.0 && moved.y.abs() < 2.0, "{step}: {moved}");
+        assert_eq!(after.outline, before.outline, "{step}");
+    }
+    // The outline beside the gripper, and its points, are still dragged.
+    page.click("#do-outline h2");
+    page.settle();
+    let before = page.saved();
+    let vertex = page.handle("[data-vertex='0'] .knob");
+    page.browser.drag(&[vertex, [vertex[0] + 3.0, vertex[1] - 6.0], [vertex[0] + 5.0, vertex[1] - 12.0]]).unwrap();
+    let after = page.saved();
+    assert_ne!(after.outline, before.outline);
+    assert_eq!(after.grasp, before.grasp);
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_gripper_on_a_removed_shadow_is_moved_to_the_part() {
+    let folder = tempfile::tempdir().unwrap();
+    shaded_plate().save(folder.path().join("photo.png")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    let corners = [[196.0, 176.0], [300.0, 250.0], [424.0, 289.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&corners).unwrap();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.browser.drag(&[page.on_screen([375.0, 240.0])]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    let middle = page.saved().grasp.unwrap().center();
+    assert!(middle.x > 345.0, "on the shadow: {middle}");
+    page.click("[data-tool=out]");
+    let stroke = [[370.0, 230.0], [380.0, 260.0], [390.0, 275.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&stroke).unwrap();
+    page.wait_for("a note", "return document.getElementById('toasts').innerText.includes('was moved there')");
+    let saved = page.saved();
+    let middle = saved.grasp.unwrap().center();
+    assert!(saved.outline.unwrap().contains(&middle), "{middle}");
+    page.screenshot("corrections-3-moved");
+    page.assert_accessible("a moved gripper");
+    page.browser.press(&["\u{e009}", "z"]).unwrap();
+    page.settle();
+    assert!(page.saved().grasp.unwrap().center().x > 345.0, "undone with the outline");
+    page.assert_quiet();
+}

@@ -58,6 +58,21 @@ fn saved(page: &Page, css: &str) -> String {
     page.browser.run(script, &[json!(css)]).unwrap().as_str().unwrap().to_owned()
 }
 
+/// Asserts that the scores beside the parts do not cover each other, at this zoom and at a quarter of it.
+fn assert_tags_apart(page: &Page) {
+    let overlaps = "const r = [...document.querySelectorAll('#overlay .tag')].map((t) => t.getBoundingClientRect());
+        return [r.length, r.flatMap((a, i) => r.slice(i + 1).filter((b) => a.left < b.right && b.left < a.right
+            && a.top + 3 < b.bottom - 3 && b.top + 3 < a.bottom - 3)).length]";
+    assert_eq!(page.browser.run(overlaps, &[]).unwrap(), json!([2, 0]));
+    for _ in 0..5 {
+        page.browser.run("document.getElementById('zoom-out').click()", &[]).unwrap();
+    }
+    page.settle_frames();
+    assert_eq!(page.browser.run(overlaps, &[]).unwrap(), json!([2, 0]), "smaller");
+    page.browser.run("document.getElementById('zoom-fit').click()", &[]).unwrap();
+    page.settle_frames();
+}
+
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn jaws_that_would_touch_a_neighbour_are_told() {
@@ -80,9 +95,12 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let room = page.browser.run("return document.documentElement.scrollHeight - innerHeight", &[]).unwrap();
     assert_eq!(room, json!(0), "the panel scrolls, not the page");
     page.screenshot("tried-1-jaws");
+    assert_tags_apart(&page);
     page.assert_accessible("jaws that touch");
     page.browser.emulate(390, 800, false).unwrap();
     page.settle_frames();
+    assert_tags_apart(&page);
+    page.screenshot("tried-1-jaws-small");
     page.assert_accessible("jaws that touch, on a small screen");
     page.assert_quiet();
 }

@@ -178,6 +178,13 @@ impl Frame {
         colors
     }
 
+    /// Colours around the box, and of the whole photo.
+    pub fn surroundings(&self) -> Option<ColorMixture> {
+        let (_, mut around) = self.colors_of(&self.candidates);
+        around.extend_from_slice(&self.elsewhere);
+        ColorMixture::learn(&around)
+    }
+
     pub fn in_photo(&self, outline: &Polygon, bbox: &BoundingBox) -> Polygon {
         let vertices = outline
             .vertices

@@ -27,6 +27,9 @@ const RADIUS_SHARE: f64 = 0.012;
 /// A stroke changes pixels within this many times its distance to the part's border: wrong areas are often longer than
 /// wide.
 const REACH: f32 = 5.0;
+/// A stroke for the part takes in colours of the table up to this share of that distance: parts may have the table's
+/// colour.
+const TABLE_REACH: f32 = 1.0;
 /// Minimum value of that distance, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
 /// Minimum edge strengths at which a selected shadow ends; the one that leaves a part along edges is used.
@@ -60,10 +63,13 @@ pub(crate) struct Correction<'a> {
 impl<'a> Correction<'a> {
     pub fn new(frame: &'a Frame, in_part: Vec<bool>) -> Self {
         let count = in_part.len();
-        let (_, mut around) = frame.colors_of(&frame.candidates);
-        around.extend_from_slice(&frame.elsewhere);
-        let surroundings = ColorMixture::learn(&around);
-        Self { frame, surroundings, in_part, pinned: vec![None; count], reached: vec![false; count] }
+        Self {
+            frame,
+            surroundings: frame.surroundings(),
+            in_part,
+            pinned: vec![None; count],
+            reached: vec![false; count],
+        }
     }
 
     /// Corrects the part by a further stroke. Distant pixels are not changed.
@@ -139,20 +145,28 @@ impl<'a> Correction<'a> {
         (is_under && is_enough).then(|| (frame.share_along_edges(&left), shadow))
     }
 
-    /// Marks the region that a stroke selects by its colour alone, and the pixels that it may change.
+    /// Marks the region that a stroke selects by its colour alone, and the pixels that it may change. A stroke for the
+    /// part takes in no colours of the table, except close to it.
     fn pin_alike(&mut self, stroke: &Stroke, distances: &[f32]) {
         let radius = self.radius();
-        let Self { frame, in_part, pinned, reached, .. } = self;
+        let Self { frame, surroundings, in_part, pinned, reached } = self;
         let (width, count) = (frame.width, in_part.len());
         let deepest = depth(stroke, in_part, width);
         let reach = REACH * deepest.max(MIN_DISTANCE_PX);
+        let own = radius.max(TABLE_REACH * deepest);
+        let is_table = |at: usize| {
+            stroke.is_inside
+                && distances[at] > own
+                && surroundings.as_ref().is_some_and(|around| around.explains(&frame.colors[at]))
+        };
+        let is_open: Vec<bool> = (0..count).map(|at| !is_table(at)).collect();
         for at in 0..count {
-            reached[at] |= distances[at] <= reach;
+            reached[at] |= distances[at] <= reach && is_open[at];
             if distances[at] <= radius {
                 pinned[at] = Some(stroke.is_inside);
             }
         }
-        pin(stroke, &frame.colors, width, in_part, pinned);
+        pin(stroke, &frame.colors, width, in_part, &is_open, pinned);
     }
 }
 
@@ -206,8 +220,8 @@ fn shadow_under(stroke: &Stroke, surroundings: &ColorMixture, colors: &[Lab]) ->
     colors.iter().map(|color| shades.iter().any(|shade| surroundings.explains_under(color, shade))).collect()
 }
 
-/// Marks the selected pixels of a stroke in `pinned`: inside, or outside.
-fn pin(stroke: &Stroke, colors: &[Lab], width: usize, in_part: &[bool], pinned: &mut [Option<bool>]) {
+/// Marks the selected pixels of a stroke in `pinned`: inside, or outside. Only open pixels are selected.
+fn pin(stroke: &Stroke, colors: &[Lab], width: usize, in_part: &[bool], is_open: &[bool], pinned: &mut [Option<bool>]) {
     // Costs in thousandths, so that they can be ordered. Each pixel is compared with the stroke's pixel from which it
     // was reached.
     let mut cost = vec![u32::MAX; colors.len()];
@@ -227,7 +241,7 @@ fn pin(stroke: &Stroke, colors: &[Lab], width: usize, in_part: &[bool], pinned: 
             let is_alike = colors[to].distance_squared(&colors[start]) <= MAX_DIFFERENCE * MAX_DIFFERENCE;
             let step = STEP + colors[at].distance_squared(&colors[to]).sqrt();
             let through = so_far.saturating_add((1e3 * step) as u32);
-            if is_wrong_side && is_alike && through <= budget && through < cost[to] {
+            if is_open[to] && is_wrong_side && is_alike && through <= budget && through < cost[to] {
                 cost[to] = through;
                 open.push(Reverse((through, to, start)));
             }
@@ -253,7 +267,7 @@ mod tests {
         let mut pinned = vec![None; colors.len()];
         let click = |x: usize, y: usize, is_inside| Stroke { pixels: vec![y * width + x], is_inside };
         let pin_all = |stroke: Stroke, pinned: &mut [Option<bool>]| {
-            pin(&stroke, &colors, width, &vec![true; width * height], pinned);
+            pin(&stroke, &colors, width, &vec![true; width * height], &vec![true; width * height], pinned);
         };
         pin_all(click(30, 10, false), &mut pinned);
         for (at, pinned) in pinned.iter().enumerate() {
@@ -289,5 +303,33 @@ mod tests {
             correction.in_part[at.pixels[0]]
         };
         assert!(has(53.0, 100.0) && has(52.0, 104.0) && !has(147.0, 100.0));
+    }
+
+    #[test]
+    fn a_stroke_for_the_part_takes_in_no_table() {
+        // A disc whose right half is hardly lighter than the table; only the left half is in the outline.
+        let in_disc = |x: f64, y: f64| (x - 100.0).hypot(y - 100.0) < 50.0;
+        let image = RgbImage::from_fn(200, 200, |x, y| {
+            let noise = (x * 7 + y * 13) as u8 % 5;
+            match (in_disc(f64::from(x), f64::from(y)), x < 100) {
+                (true, true) => Rgb([170 + noise, 60, 50]),
+                (true, false) => Rgb([140 + noise, 146, 142]),
+                (false, _) => Rgb([120, 125 + noise, 121]),
+            }
+        });
+        let bbox = BoundingBox { x1: 45.0, y1: 45.0, x2: 155.0, y2: 155.0 };
+        let frame = Frame::cut_out(&image, &bbox, 1e9).unwrap();
+        let place = |at: usize| (23.0 + (at % frame.width) as f64, 23.0 + (at / frame.width) as f64);
+        let half = |at: usize| in_disc(place(at).0, place(at).1) && place(at).0 < 100.0;
+        let start: Vec<bool> = (0..frame.colors.len()).map(half).collect();
+        let mut correction = Correction::new(&frame, start);
+        let points = [80.0, 100.0, 120.0].map(|y| Point2::new(125.0, y)).to_vec();
+        correction.apply(&frame.stroke(&OutlineStroke { points, is_inside: true }).unwrap());
+        let count = |is_part: bool| {
+            let taken = |&at: &usize| correction.in_part[at] && in_disc(place(at).0, place(at).1) == is_part;
+            (0..frame.colors.len()).filter(taken).count() as f64
+        };
+        let disc = std::f64::consts::PI * 50.0 * 50.0;
+        assert!(count(true) > 0.95 * disc && count(false) < 0.03 * disc, "{} and {}", count(true), count(false));
     }
 }

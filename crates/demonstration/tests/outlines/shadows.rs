@@ -38,6 +38,8 @@ pub struct Lamp {
     pub length: f64,
     /// Remaining light, for red, green and blue.
     pub left: [f64; 3],
+    /// Width of the shadow's border as a share of its length: a small lamp casts a sharp one.
+    pub blur: f64,
 }
 
 /// Casts a shadow of the part at `truth`.
@@ -61,7 +63,7 @@ pub fn cast(photo: &RgbImage, truth: &Polygon, lamp: &Lamp) -> Shaded {
             }
         }
     }
-    let depth = blurred(&swept, (length / 8.0).max(1.0) as usize);
+    let depth = blurred(&swept, (lamp.blur * length).max(1.0) as usize);
     let at = |x: u32, y: u32| depth[(y * width + x) as usize];
     let image = RgbImage::from_fn(width, height, |x, y| {
         let pixel = photo.get_pixel(x, y).0;
