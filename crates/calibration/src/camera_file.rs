@@ -197,8 +197,7 @@ impl CalibratedCamera {
         }
     }
 
-    /// Whether name, lens and both poses are equal, except for rounding of the quaternions, which are normalised on
-    /// reading. The other values of the table are not compared.
+    /// Whether both are equal except for rounding of the quaternions, which are normalised on reading.
     fn is_near(&self, other: &Self) -> bool {
         let poses =
             |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];
