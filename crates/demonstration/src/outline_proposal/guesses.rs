@@ -160,3 +160,22 @@ fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
     let gap = gaps.fold(0.0, f64::max);
     Some((frame.share_along_edges(&part) - GAP_COST * (gap - MAX_GAP).max(0.0), part))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cut(is_unshaded: bool, table: f64, shadow: f64) -> Cut {
+        Cut { score: 0.0, is_unshaded, table, shadow, part: Vec::new() }
+    }
+
+    #[test]
+    fn a_shadow_is_told_by_a_cut_without_it() {
+        let with_shadow = cut(true, 0.1, 0.3);
+        assert!(cut(false, 0.1, 0.05).leaves_shadow_of(&with_shadow));
+        // A dark part has these colours in every cut.
+        assert!(!cut(false, 0.1, 0.25).leaves_shadow_of(&with_shadow));
+        // The table's own colours are no shadow.
+        assert!(!cut(false, 0.0, 0.0).leaves_shadow_of(&cut(true, 0.4, 0.05)));
+    }
+}
