@@ -25,7 +25,7 @@ use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
-use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
+use crate::verification::{PlacedDemonstration, SearchedImage, Shot, search};
 
 /// Minimum length of the shorter side of an image. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
 const MIN_SIDE_PX: u32 = 32;
@@ -255,15 +255,41 @@ impl GraspModel {
 
     /// Detections in an image at this slant, and the slant suggested by the best matches if `suggest` is set.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
-        let searched = SearchedImage::of(image, shot, &self.demonstrations);
-        let proposals = match &self.network {
-            Some(network) => network.proposals_async(image, shot.size, &self.demonstrations).await?,
-            None => Proposals::default(),
+        let search = || {
+            let searched = SearchedImage::of(image, shot, &self.demonstrations);
+            let found = search(&searched);
+            (searched, found)
         };
-        let sightings = sightings(&proposals, &searched);
+        let ((searched, found), proposals) = self.beside_network(image, shot, search).await;
+        let sightings = sightings(&proposals?, &found, &searched);
         let is_asked = suggest && !self.demonstrations[0].check().score.is_size_known;
         let slant = if is_asked { suggested_slant(image, shot, &sightings, &searched) } else { None };
         Ok((self.judged(sightings), slant))
+    }
+
+    /// The network's proposals, and the result of `work`, which is done meanwhile.
+    #[cfg(not(target_arch = "wasm32"))]
+    async fn beside_network<R: Send>(
+        &self,
+        image: &RgbImage,
+        shot: &Shot,
+        work: impl FnOnce() -> R + Send,
+    ) -> (R, Result<Proposals>) {
+        let Some(network) = &self.network else { return (work(), Ok(Proposals::default())) };
+        sdg_shape::parallel::join(work, || read_sync(network.proposals_async(image, shot.size, &self.demonstrations)))
+    }
+
+    /// The network's proposals, and the result of `work`. A browser has one thread.
+    #[cfg(target_arch = "wasm32")]
+    async fn beside_network<R>(
+        &self,
+        image: &RgbImage,
+        shot: &Shot,
+        work: impl FnOnce() -> R,
+    ) -> (R, Result<Proposals>) {
+        let Some(network) = &self.network else { return (work(), Ok(Proposals::default())) };
+        let proposals = network.proposals_async(image, shot.size, &self.demonstrations).await;
+        (work(), proposals)
     }
 
     fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {

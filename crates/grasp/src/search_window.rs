@@ -6,7 +6,7 @@
 //! The margin is half the part's length, so that parts that extend beyond the region are complete in the window. Pixels
 //! beyond the margin are not read.
 
-use image::{RgbImage, imageops};
+use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon, convex_hull};
 
@@ -95,7 +95,11 @@ impl SearchWindow {
     /// The pixels of the window.
     pub(crate) fn cut(&self, image: &RgbImage) -> RgbImage {
         let PixelRect { left, top, width, height } = self.rect;
-        imageops::crop_imm(image, left, top, width, height).to_image()
+        let [left, width, stride] = [left, width, image.width()].map(|columns| 3 * columns as usize);
+        let rows = image.as_raw().chunks_exact(stride.max(1)).skip(top as usize).take(height as usize);
+        let mut pixels = Vec::with_capacity(width * height as usize);
+        rows.for_each(|row| pixels.extend_from_slice(&row[left..left + width]));
+        RgbImage::from_raw(self.rect.width, height, pixels).unwrap_or_default()
     }
 
     /// The shot of the window by a level camera.

@@ -5,7 +5,9 @@ use sdg_shape::parallel;
 use crate::facts::TurnSource;
 use crate::models::{PoseCandidate, Proposals};
 use crate::same_part::are_outlines_of_same_part;
-use crate::verification::{PlacedDemonstration, SearchedImage, search, verify};
+#[cfg(feature = "teach")]
+use crate::verification::search;
+use crate::verification::{PlacedDemonstration, SearchedImage, verify};
 
 /// A place where the part may be, before it is scored.
 pub(crate) struct Sighting<'a> {
@@ -23,10 +25,14 @@ pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'
     sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
 }
 
-/// All such places in an image: first the network's proposals, then the matches of the search. A place may occur twice.
-pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) -> Vec<Sighting<'a>> {
-    let found = search(image);
-    let proposed = parallel::map(&proposals.candidates, |candidate| proposed(candidate, &found, image));
+/// All such places in an image: first the network's proposals, then `found`, the matches of the search. A place may
+/// occur twice.
+pub(crate) fn sightings<'a>(
+    proposals: &Proposals,
+    found: &[PlacedDemonstration<'a>],
+    image: &SearchedImage<'a>,
+) -> Vec<Sighting<'a>> {
+    let proposed = parallel::map(&proposals.candidates, |candidate| proposed(candidate, found, image));
     proposed.into_iter().flatten().chain(found.iter().map(|placed| searched(placed, proposals))).collect()
 }
 

@@ -86,12 +86,16 @@ pub(crate) fn suggested_slant(
     });
     let shortened: Vec<Shortened> = shortened.into_iter().flatten().collect();
     let focal_px = usual_focal_px(shot.size);
-    let costs: Vec<(f64, Slant)> =
-        slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant))).collect();
+    let mut costs = slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant)));
+    let level = costs.next()?;
+    if level.0 < MIN_EXPLAINED {
+        // Costs are not below 0, so that no slant explains enough.
+        return None;
+    }
+    let costs: Vec<(f64, Slant)> = std::iter::once(level).chain(costs).collect();
     let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();
-    let (level_cost, _) = costs.first()?;
     let (least_cost, likeliest) = least(&mut costs.iter())?;
-    if likeliest.tilt_rad < MIN_TILT || level_cost - least_cost < MIN_EXPLAINED {
+    if likeliest.tilt_rad < MIN_TILT || level.0 - least_cost < MIN_EXPLAINED {
         return None;
     }
     let is_opposite =

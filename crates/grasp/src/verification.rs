@@ -14,7 +14,7 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
-use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, TableColors, parallel};
+use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Match, Picture, TableColors, parallel};
 
 use crate::colors::Colors;
 use crate::marks_shift::{MarksShift, Straightened};
@@ -265,18 +265,15 @@ impl SizedDemonstration<'_> {
 
 /// Every place in the image where a demonstration agrees well enough to be listed.
 pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstration<'a>> {
-    let mut found = Vec::new();
-    for sized in &searched.sized {
+    let found_by = |sized: &SizedDemonstration<'a>| {
         let view = &searched.views[sized.view_idx];
-        for found_there in sized.prepared.search.search_picture(&view.picture()) {
-            let pose = &found_there.image_from_demonstration;
-            if sized.is_of_other_size(view, pose, found_there.agreement) {
-                continue;
-            }
-            found.push(sized.placed(view, pose, found_there.agreement, found_there.evidence));
-        }
-    }
-    found
+        let matches = sized.prepared.search.search_picture(&view.picture());
+        parallel::map(&matches, |found| {
+            let Match { image_from_demonstration: pose, agreement, evidence } = found;
+            (!sized.is_of_other_size(view, pose, *agreement)).then(|| sized.placed(view, pose, *agreement, *evidence))
+        })
+    };
+    searched.sized.iter().flat_map(found_by).flatten().collect()
 }
 
 /// Lays the demonstration over the image at the candidate, in both directions, and returns the better pose; `None` if

@@ -169,18 +169,23 @@ impl Comparison<'_> {
 
     /// A close look at a pose.
     pub fn close_look(&self, image_from_demonstration: &PlanarSimilarity) -> CloseLook {
-        let seen = self.close_up.seen(self.picture.image, image_from_demonstration);
-        let look = self.close_up.look(&seen, self.picture.table);
-        let networks = || {
-            let likeness = self.likeness.log_odds(self.picture.image, image_from_demonstration);
+        let Picture { image, field, table } = self.picture;
+        let looked = || {
+            let seen = self.close_up.seen(image, image_from_demonstration);
+            let look = self.close_up.look(&seen, table);
+            (seen, look)
+        };
+        let ((seen, look), likeness) =
+            parallel::join(looked, || self.likeness.log_odds(image, image_from_demonstration));
+        let details = || {
             let is_open = look.is_plausible() && likeness >= MIN_LIKENESS;
-            (likeness, is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten())
+            is_open.then(|| self.details.log_odds(image, image_from_demonstration)).flatten()
         };
         let mirrored = || {
             let rival = self.mirrored.filter(|_| look.is_plausible())?;
-            rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration)
+            rival.against(self.close_up, &seen, field, image_from_demonstration)
         };
-        let ((likeness, details), mirrored) = parallel::join(networks, mirrored);
+        let (details, mirrored) = parallel::join(details, mirrored);
         CloseLook {
             likeness,
             // In another roll the part's features are elsewhere.

@@ -78,7 +78,7 @@ impl ShapeTemplate {
         reach: &Reach,
     ) -> (PlanarSimilarity, f64) {
         let start = Pose::from_similarity(start, self.center);
-        let pose = self.follow_to(field, &reach.about(start), start, self.agreement_level_idx);
+        let pose = self.follow_roughly(field, &reach.about(start), start);
         (pose.to_similarity(self.center), self.agreement_at(field, &pose))
     }
 

@@ -11,11 +11,14 @@
 //! image's gradient along its normal and solves for the pose by weighted least squares: exact, but
 //! only near the solution.
 
+use std::cell::RefCell;
+
 use sdg_geometry::{CompassSearch, PlanarSimilarity};
 
 use crate::capture_range::{CaptureRange, step_units};
 use crate::consensus::{Snapped, snap};
 use crate::gradient_field::GradientField;
+use crate::parallel;
 use crate::pose::Pose;
 use crate::template::{LevelSampling, MatchedLevel, ShapeTemplate, TemplateLevel};
 
@@ -65,10 +68,8 @@ impl ShapeTemplate {
         let mut num_rounds = 0;
         for (idx, level) in self.levels.iter().enumerate().rev() {
             let matched = range.matched_level(level, field);
-            let mut snapped: Vec<Snapped> = candidates
-                .iter()
-                .map(|&pose| snap(level, &matched, range, climb(level, &matched, range, pose)))
-                .collect();
+            let mut snapped: Vec<Snapped> =
+                parallel::map(&candidates, |&pose| snap(level, &matched, range, climb(level, &matched, range, pose)));
             snapped.sort_by(|a, b| b.score.total_cmp(&a.score));
             num_rounds = snapped[0].num_rounds;
             let keep = if idx == 0 { 1 } else { snapped.len().div_ceil(2) };
@@ -100,15 +101,18 @@ impl ShapeTemplate {
 
     /// Climbs and snaps from `from` within `range`, coarse to fine.
     pub(crate) fn follow(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
-        self.follow_to(field, range, from, 0)
+        let rough = self.follow_roughly(field, range, from);
+        self.follow_finely(field, range, rough)
     }
 
-    /// The same down to a level that may be coarser than the finest.
-    pub(crate) fn follow_to(&self, field: &GradientField, range: &CaptureRange, from: Pose, last_idx: usize) -> Pose {
-        self.levels[last_idx..].iter().rev().fold(from, |pose, level| {
-            let matched = range.matched_level(level, field);
-            snap(level, &matched, range, climb(level, &matched, range, pose)).pose
-        })
+    /// The same down to the agreement's level.
+    pub(crate) fn follow_roughly(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
+        follow_in(&self.levels[self.agreement_level_idx..], field, range, from)
+    }
+
+    /// The same from there on, for a pose that was followed roughly.
+    pub(crate) fn follow_finely(&self, field: &GradientField, range: &CaptureRange, rough: Pose) -> Pose {
+        follow_in(&self.levels[..self.agreement_level_idx], field, range, rough)
     }
 
     /// The best poses of a grid over the capture range, on the coarsest level, without duplicates.
@@ -145,11 +149,44 @@ impl ShapeTemplate {
     }
 }
 
+fn follow_in(levels: &[TemplateLevel], field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
+    levels.iter().rev().fold(from, |pose, level| {
+        let matched = range.matched_level(level, field);
+        snap(level, &matched, range, climb(level, &matched, range, pose)).pose
+    })
+}
+
+/// The scores of the last poses of a climb: after a step, the pose before it is a neighbour, and at a limit all further
+/// steps end at the same pose.
+#[derive(Default)]
+struct LastScores {
+    kept: [Option<(Pose, f64)>; 8],
+    next: usize,
+}
+
+impl LastScores {
+    /// Poses that differ by rounding alone, in pixels and radians.
+    const SAME: [f64; 4] = [1e-9; 4];
+
+    fn score(&mut self, pose: &Pose, score: impl Fn() -> f64) -> f64 {
+        if let Some((_, score)) = self.kept.iter().flatten().find(|(other, _)| pose.is_near(other, Self::SAME)) {
+            return *score;
+        }
+        let score = score();
+        self.kept[self.next % self.kept.len()] = Some((*pose, score));
+        self.next += 1;
+        score
+    }
+}
+
 /// Compass search for the best alignment at a level, minus a penalty for the distance from the start.
 fn climb(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Pose {
     let units = step_units(level, matched, &from);
+    let last = RefCell::new(LastScores::default());
     let evaluate = |pose: &Pose| {
-        matched.mean_alignment(level, pose, LevelSampling::Bilinear) - DISTANCE_PENALTY * range.distance(pose)
+        let score =
+            || matched.mean_alignment(level, pose, LevelSampling::Bilinear) - DISTANCE_PENALTY * range.distance(pose);
+        last.borrow_mut().score(pose, score)
     };
     let neighbour = |pose: &Pose, coordinate: usize, step: f64| {
         let mut change = [0.0; 4];
@@ -157,4 +194,29 @@ fn climb(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange
         (range.limits[coordinate] > 0.0).then(|| range.clamped(&pose.moved(change)))
     };
     CLIMB.climb(from, neighbour, evaluate).0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+    use std::cell::Cell;
+
+    #[test]
+    fn the_score_of_one_of_the_last_poses_is_not_computed_again() {
+        let at = |x: f64| Pose { center: Point2::new(x, 1.0), angle_rad: 0.1, log_scale: 0.0 };
+        let computed = Cell::new(0);
+        let mut last = LastScores::default();
+        let mut score = |pose: &Pose| {
+            last.score(pose, || {
+                computed.set(computed.get() + 1);
+                pose.center.x
+            })
+        };
+        assert_eq!([1.0, 2.0, 1.0 + 1e-12, 2.0].map(|x| score(&at(x))), [1.0, 2.0, 1.0, 2.0]);
+        assert_eq!(computed.get(), 2);
+        // Eight are kept.
+        (10..18).for_each(|x| assert_eq!(score(&at(f64::from(x))), f64::from(x)));
+        assert_eq!((score(&at(1.0)), computed.get()), (1.0, 11));
+    }
 }

@@ -100,6 +100,8 @@ impl<const N: usize> WithSimd for Gather<'_, N> {
     }
 }
 
+const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
 /// The samples along a normal from one end to the other.
 type Samples = [f32x4; 2 * LANES];
 
@@ -108,7 +110,8 @@ fn seen<const N: usize>(level: &GradientLevel, place: &EdgePlace<N>, reach: usiz
     let middle = (reach + 1) as f32;
     let mut samples = [f32x4::ZERO; 2 * LANES];
     for (group, out) in samples.chunks_exact_mut(LANES).enumerate() {
-        let t: [f32; LANES] = std::array::from_fn(|k| (group * LANES + k) as f32 - middle);
+        let first = (group * LANES) as f32 - middle;
+        let t: [f32; LANES] = std::array::from_fn(|k| first + STEPS[k]);
         let count = (2 * reach + 3).saturating_sub(group * LANES).min(LANES);
         let [x, y] = [0, 1].map(|i| t.map(|t| place.at[i] + t * place.normal[i]));
         level.bilinear_all(&x, &y, &mut out[..count]);
@@ -129,12 +132,19 @@ fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Opti
         trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
         squares[k] = trusts[k] * (energy + floor);
     }
+    // Most samples are none: all are compared at once, because single branches are often mispredicted.
+    let mut is_crest = [0u32; 2 * LANES];
+    for k in 1..2 * LANES - 1 {
+        let is_highest = (squares[k] >= squares[k - 1]) & (squares[k] > squares[k + 1]);
+        is_crest[k] = if is_highest & (trusts[k] >= MIN_TRUST) { 1 << k } else { 0 };
+    }
+    // Not the last sample, and none of the unused places.
+    let mut left = is_crest.into_iter().fold(0, |bits, bit| bits | bit) & ((1 << (len - 1)) - 1);
     let mut crests = [(0.0f32, 0.0f32); MAX_CRESTS];
     let mut count = 0;
-    for k in 1..len - 1 {
-        if squares[k] < squares[k - 1] || squares[k] <= squares[k + 1] || trusts[k] < MIN_TRUST {
-            continue;
-        }
+    while left != 0 {
+        let k = left.trailing_zeros() as usize;
+        left &= left - 1;
         let [before, here, after] = [squares[k - 1], squares[k], squares[k + 1]].map(f32::sqrt);
         let crest = (k as f32 - middle + parabola_peak(before, here, after), trusts[k]);
         if count < MAX_CRESTS {
@@ -169,5 +179,48 @@ mod tests {
             let [dx, dy, energy] = expected.unwrap_or_default();
             assert!(samples.iter().all(|sample| sample.to_array()[..3] == [dx, dy, energy]), "{x}, {y}: {samples:?}");
         }
+    }
+
+    /// One sample after the other.
+    fn crests_one_by_one(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Vec<(f32, f32)> {
+        let trust = |k: usize| (samples[k].to_array()[0] * double[0] + samples[k].to_array()[1] * double[1]).max(0.0);
+        let square = |k: usize| trust(k) * (samples[k].to_array()[2] + floor);
+        let is_crest = |k: &usize| square(*k) >= square(k - 1) && square(*k) > square(k + 1) && trust(*k) >= MIN_TRUST;
+        let place = |k: usize| {
+            let [before, here, after] = [k - 1, k, k + 1].map(|k| square(k).sqrt());
+            (k as f32 - (reach + 1) as f32 + parabola_peak(before, here, after), trust(k))
+        };
+        let mut all: Vec<(f32, f32)> = (1..2 * reach + 2).filter(is_crest).map(place).collect();
+        // Of more than three the furthest are replaced by nearer ones.
+        all.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        all.truncate(MAX_CRESTS);
+        all
+    }
+
+    #[test]
+    fn crests_found_at_once_are_those_found_one_by_one() {
+        let mut bits = 1u32;
+        let mut random = move || {
+            bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (bits >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut counts = [0; MAX_CRESTS + 1];
+        for round in 0..2000 {
+            let reach = if round % 2 == 0 { FIRST_REACH } else { LATER_REACH };
+            let mut samples = [f32x4::ZERO; 2 * LANES];
+            for sample in &mut samples[..2 * reach + 3] {
+                // Equal neighbours occur, too.
+                let energy = (4.0 * random()).floor();
+                *sample = f32x4::new([random() - 0.3, random() - 0.5, energy, 0.0]);
+            }
+            let mut found: Vec<_> = crests(&samples, 0.5, [0.8, 0.6], reach).into_iter().flatten().collect();
+            found.retain(|(_, trust)| *trust > 0.0);
+            // Of two equally near ones the earlier is first.
+            found.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()).then(a.0.total_cmp(&b.0)));
+            let expected = crests_one_by_one(&samples, 0.5, [0.8, 0.6], reach);
+            assert_eq!(found, expected, "round {round}");
+            counts[found.len()] += 1;
+        }
+        assert!(counts.iter().all(|count| *count > 10), "{counts:?}");
     }
 }

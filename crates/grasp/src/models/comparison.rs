@@ -10,6 +10,7 @@
 use image::RgbImage;
 use sdg_comparison::{Comparison, ComparisonNetwork, Pyramid, Reference, View};
 use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_shape::parallel;
 
 use super::candidate::PoseCandidate;
 use super::consistency::ComparisonEvidence;
@@ -79,10 +80,10 @@ impl<'a> Comparer<'a> {
 
     /// Each candidate in its most likely pose; of equally likely poses, the first.
     async fn likeliest(&self, candidates: Vec<(PoseCandidate, Vec<PlanarSimilarity>)>) -> Vec<Compared> {
-        let of_candidate = |(one, poses): &(PoseCandidate, Vec<PlanarSimilarity>)| -> Vec<View> {
-            poses.iter().map(|pose| self.reference(one).view(&self.picture, pose)).collect()
+        let poses = |(one, poses): &(PoseCandidate, Vec<PlanarSimilarity>)| -> Vec<(&Reference, PlanarSimilarity)> {
+            poses.iter().map(|pose| (self.reference(one), *pose)).collect()
         };
-        let views: Vec<View> = candidates.iter().flat_map(of_candidate).collect();
+        let views = self.views(&candidates.iter().flat_map(poses).collect::<Vec<_>>());
         let mut comparisons = self.network.compare(&views).await.into_iter();
         let likeliest = |(one, poses): (PoseCandidate, Vec<PlanarSimilarity>)| {
             let demonstration = self.demonstration(&one);
@@ -106,10 +107,10 @@ impl<'a> Comparer<'a> {
             _ => vec![one.image_from_cutout],
         };
         let poses: Vec<Vec<PlanarSimilarity>> = compared.iter().enumerate().map(ways).collect();
-        let views = |((one, _), poses): (&Compared, &Vec<PlanarSimilarity>)| -> Vec<View> {
-            poses.iter().map(|pose| reference(one).view(&self.picture, pose)).collect()
+        let in_poses = |((one, _), poses): (&Compared, &Vec<PlanarSimilarity>)| -> Vec<(&Reference, PlanarSimilarity)> {
+            poses.iter().map(|pose| (reference(one), *pose)).collect()
         };
-        let views: Vec<View> = compared.iter().zip(&poses).flat_map(views).collect();
+        let views = self.views(&compared.iter().zip(&poses).flat_map(in_poses).collect::<Vec<_>>());
         let mut alignments = self.network.align(&views).await.into_iter();
         let aligned = |((one, comparison), poses): (Compared, Vec<PlanarSimilarity>)| {
             let ways = poses.into_iter().zip(alignments.by_ref());
@@ -121,6 +122,10 @@ impl<'a> Comparer<'a> {
             Some(one.in_pose(demonstration, pose, self.picture_size, Some(evidence)))
         };
         compared.into_iter().zip(poses).filter_map(aligned).collect()
+    }
+
+    fn views(&self, poses: &[(&Reference, PlanarSimilarity)]) -> Vec<View> {
+        parallel::map(poses, |(reference, pose)| reference.view(&self.picture, pose))
     }
 
     fn demonstration(&self, candidate: &PoseCandidate) -> &'a TaughtDemonstration {

@@ -12,7 +12,7 @@ use crate::models::{Network, Proposals};
 use crate::network_calibration::NetworkCalibration;
 use crate::sighting::{Sighting, best_agreement, sightings, sightings_to_first};
 use crate::taught::TaughtDemonstration;
-use crate::verification::SearchedImage;
+use crate::verification::{SearchedImage, search};
 
 /// The samples on which no network is trained.
 pub(super) struct HeldBack<'a> {
@@ -116,7 +116,7 @@ impl HeldBack<'_> {
         let has_part = !sample.objects.is_empty();
         let sightings = match has_part {
             true => sightings_to_first(proposals, &searched, |sighting| hit(sighting).is_some()),
-            false => sightings(proposals, &searched),
+            false => sightings(proposals, &search(&searched), &searched),
         };
         let highest = |right: bool, proposed: bool| {
             let of_kind = sightings

@@ -20,7 +20,7 @@ use crate::models::{Network, Proposals};
 use crate::sighting::{best_agreement, sightings};
 use crate::sizes::scaling;
 use crate::taught::TaughtDemonstration;
-use crate::verification::SearchedImage;
+use crate::verification::{SearchedImage, search};
 
 /// Minimum number of scenes with any agreement for a mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
@@ -74,7 +74,7 @@ impl NegativeScenes {
         let highest = side_by_side(&self.scenes, |sample| {
             let searched = SearchedImage::new(&sample.image, demonstrations);
             let proposals = network.map_or(Ok(Proposals::default()), |n| n.proposals(&sample.image, demonstrations))?;
-            let sightings = sightings(&proposals, &searched);
+            let sightings = sightings(&proposals, &search(&searched), &searched);
             Ok(best_agreement(&sightings).map(|best| (best.placed.agreement, best.network_score)))
         })?;
         Ok(Resemblances { highest: highest.into_iter().flatten().collect() })
@@ -125,7 +125,6 @@ impl Resemblances {
 mod tests {
     use super::*;
     use crate::teach::tests::demonstration;
-    use crate::verification::search;
 
     #[test]
     fn other_things_resemble_the_part_less_than_it_resembles_itself() {

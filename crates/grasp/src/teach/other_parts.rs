@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::models::Network;
 use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::SearchedImage;
+use crate::verification::{SearchedImage, search};
 
 /// Photos of the size of the network's input.
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
@@ -67,7 +67,8 @@ pub(super) fn shown(
         let sample = augmenter.held_out(number);
         let proposals = network.proposals(&sample.image, &taught)?;
         let highest = proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score);
-        let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, &taught));
+        let searched = SearchedImage::new(&sample.image, &taught);
+        let sightings = sightings(&proposals, &search(&searched), &searched);
         Ok((highest, best_agreement(&sightings).map(|sighting| sighting.network_score)))
     })?;
     for (highest, best_agreement) in seen {

@@ -138,8 +138,8 @@ impl Rival {
         pose: &PlanarSimilarity,
     ) -> Option<PlanarSimilarity> {
         let agreement = self.template.agreement(field, pose);
-        let turns = self.starts.iter().map(|start| self.template.captured_roughly(field, &pose.compose(start), &REACH));
-        let likely = turns.filter(|(_, of_turn)| *of_turn >= agreement - MAX_LOSS_BY_TURN);
+        let likely =
+            self.followed(field, pose).into_iter().filter(|(_, of_turn)| *of_turn >= agreement - MAX_LOSS_BY_TURN);
         let likely: Vec<PlanarSimilarity> = likely.map(|(turn, _)| turn).collect();
         if likely.is_empty() {
             return None;

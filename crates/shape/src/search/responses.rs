@@ -158,13 +158,13 @@ impl DirectionPlanes {
                 let across = &mut across[row % RING];
                 across.copy_from_slice(&plain[..width]);
                 for shift in 1..RING {
-                    raise(across, &plain[shift..shift + width]);
+                    in_lanes(Raise { values: across, to: &plain[shift..shift + width] });
                 }
             }
             let Some(middle) = row.checked_sub(SPREAD) else { continue };
             spread.copy_from_slice(&across[middle % RING]);
             for near in middle.saturating_sub(SPREAD)..(middle + SPREAD + 1).min(height) {
-                raise(&mut spread, &across[near % RING]);
+                in_lanes(Raise { values: &mut spread, to: &across[near % RING] });
             }
             put(middle, &spread);
         }
@@ -194,9 +194,20 @@ impl WithSimd for Responded<'_> {
 }
 
 /// Raises every value at least to its counterpart.
-fn raise(values: &mut [u8], to: &[u8]) {
-    for (value, &other) in values.iter_mut().zip(to) {
-        *value = (*value).max(other);
+struct Raise<'a> {
+    values: &'a mut [u8],
+    to: &'a [u8],
+}
+
+impl WithSimd for Raise<'_> {
+    type Output = ();
+
+    /// As there.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (value, &other) in self.values.iter_mut().zip(self.to) {
+            *value = (*value).max(other);
+        }
     }
 }
 

@@ -1,0 +1,46 @@
+use super::*;
+use image::Rgb;
+use sdg_geometry::{Angle, BoundingBox};
+
+/// A dark plate with a bright hole.
+fn plate() -> (RgbImage, Polygon) {
+    let image = RgbImage::from_fn(200, 160, |x, y| {
+        let on_plate = (50..150).contains(&x) && (50..110).contains(&y);
+        let in_hole = (x as f32 - 125.0).hypot(y as f32 - 88.0) < 10.0;
+        Rgb([if on_plate && !in_hole { 60 } else { 200 }; 3])
+    });
+    (image, Polygon::from_box(&BoundingBox { x1: 50.0, y1: 50.0, x2: 150.0, y2: 110.0 }))
+}
+
+#[test]
+fn only_a_place_under_a_clearly_better_one_cannot_match() {
+    let (image, outline) = plate();
+    let search = ShapeSearch::new(&image, &outline, &SearchConfig::DEFAULT).unwrap();
+    let found = |right: f64, agreement: f64| Found { pose: PlanarSimilarity::translation(right, 0.0), agreement };
+    let cannot = |rough: &Found, other: Found| search.cannot_match(rough, [other].iter());
+    let rough = found(0.0, 0.5);
+    // 20 of its 100 pixels aside, then 70.
+    assert!(cannot(&rough, found(20.0, 0.7)) && !cannot(&rough, found(70.0, 0.7)));
+    assert!(!cannot(&rough, found(20.0, 0.55)) && !cannot(&rough, rough));
+    // Alone it cannot if it would have to gain more than any place does to be refined or listed.
+    assert!(!search.cannot_match(&found(0.0, 0.2), [].iter()) && search.cannot_match(&found(0.0, 0.1), [].iter()));
+}
+
+#[test]
+fn overlaps_are_what_counting_all_points_gives() {
+    let (image, outline) = plate();
+    let search = ShapeSearch::new(&image, &outline, &SearchConfig::DEFAULT).unwrap();
+    let center = outline.bounds().center();
+    let mut both = [0, 0];
+    for (turn, right) in
+        (0..12).flat_map(|turn| (0..12).map(move |right| (30.0 * f64::from(turn), 9.0 * f64::from(right))))
+    {
+        let to = center + Vector2::new(right, 0.4 * right);
+        let pose = PlanarSimilarity::about(center, to, Angle::from_degrees(turn), 1.0);
+        let share = search.surface.share_inside(&outline, &pose);
+        let has = search.surface.has_inside(&outline, &pose, MAX_OVERLAP);
+        assert_eq!(has, share > MAX_OVERLAP, "{turn}° and {right} px: {share}");
+        both[usize::from(has)] += 1;
+    }
+    assert!(both[0] > 20 && both[1] > 20, "{both:?}");
+}
