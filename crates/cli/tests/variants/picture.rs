@@ -246,7 +246,7 @@ pub fn spoilt(dice: &mut Pcg64Mcg, photo: &RgbImage) -> (Photo, &'static [&'stat
         10 => (format!("WebP cut at {share:.2}"), cut(&encoded(&whole, ImageFormat::WebP), share), &["WebP"]),
         11 => {
             let tiff = Tiff { other_pages: 1, ..plain_tiff(photo) };
-            ("TIFF of two pages".into(), tiff.bytes(), &["2 pages"])
+            ("TIFF of two pages".into(), tiff.bytes(), &["2 full-size pages"])
         }
         12 => ("PNG in grey".into(), encoded(&whole.to_luma8().into(), ImageFormat::Png), &["score"]),
         13 => {
