@@ -302,7 +302,7 @@ fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
     let offset = &told["label_offset"];
     assert_eq!((&offset["agreeing"]["count"], &offset["totals"]["found"]["count"]), (&json!(3), &json!(3)), "{offset}");
     let page = fs::read_to_string(told["report"].as_str().unwrap()).unwrap();
-    assert!(page.contains("The labels mark another grasp"));
+    assert!(page.contains("The labels mark a different grasp"));
 
     // Labels of the taught grasp have no offset.
     for quarters in 1..4 {
@@ -341,7 +341,7 @@ fn wrong_folders_are_refused_with_what_was_expected() {
     let rectangle = &instance("pendulum", 1, 100.0)[..1];
     refused(Case::new("a.json", &labelme(rectangle)), &["a.json, shapes[0]", "lacks the grasp", "grasp_start"]);
     let both = [instance("bolt", 1, 100.0), instance("nut", 2, 300.0)].concat();
-    refused(Case::new("a.json", &labelme(&both)), &["labelled pendulum", "found bolt, nut", "--label"]);
+    refused(Case::new("a.json", &labelme(&both)), &["the label pendulum", "found bolt, nut", "--label"]);
     Case::new("a.json", &labelme(&both)).assert_refused(
         &model,
         &["--label", "screw"],

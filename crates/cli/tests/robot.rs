@@ -136,7 +136,7 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulums"], 2, &["--from: ", "pendulums"]);
     for speed in ["0", "0.7", "-1", "NaN"] {
         let speed = format!("--speed={speed}");
-        grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a share", "at most 0.6"]);
+        grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a fraction", "at most 0.6"]);
     }
 
     for (told, expected) in

@@ -78,7 +78,7 @@ pub(crate) fn convolved<const OUTPUTS: usize>(
     layer: &Layer,
     convolution: &Linear,
 ) -> Vec<f32> {
-    const { assert!(OUTPUTS % (CHANNELS / 2) == 0, "channels are summed by sixteen or eight") };
+    const { assert!(OUTPUTS.is_multiple_of(CHANNELS / 2), "channels are summed by sixteen or eight") };
     let (inputs, out_side) = (layer.inputs, side / layer.stride);
     let padded = Padded::new(map, side, inputs);
     let mut out = vec![0.0; out_side * out_side * OUTPUTS];
