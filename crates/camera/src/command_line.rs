@@ -90,9 +90,13 @@ mod tests {
 
     #[test]
     fn what_does_not_close_is_refused() {
-        for (text, expected) in
-            [("", "a program"), ("''", "a program"), ("a 'b", "closing '"), ("a \"b", "closing \""), ("a\\", "backslash")]
-        {
+        for (text, expected) in [
+            ("", "a program"),
+            ("''", "a program"),
+            ("a 'b", "closing '"),
+            ("a \"b", "closing \""),
+            ("a\\", "backslash"),
+        ] {
             let error = text.parse::<CommandLine>().unwrap_err().to_string();
             assert!(error.contains(expected), "{text}: {error}");
         }

@@ -273,7 +273,7 @@ mod tests {
             assert!(message.contains("expected a PNG, JPEG, WebP, BMP or TIFF file"), "{message}");
         }
         assert!(message("avif").contains("AVIF"));
-        assert!(message("isom").contains("film"));
+        assert!(message("isom").contains("video"));
     }
 
     #[test]
