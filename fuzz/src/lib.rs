@@ -13,7 +13,7 @@
 //!
 //! ```
 //! let workcell = sdg_fuzz::TARGETS.iter().find(|target| target.name == "workcell").unwrap();
-//! The target returns for all bytes.
+//! // The target returns for all bytes.
 //! assert!(!(workcell.run)(b"[table]\nheight_mm = \"high\""));
 //! ```
 // Not `forbid`, because targets/c_border.rs calls the C library.

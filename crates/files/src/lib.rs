@@ -16,7 +16,7 @@
 //! let path = folder.join("result.json");
 //! sdg_files::write(&path, b"{}")?;
 //! assert_eq!(sdg_files::read(&path, 100)?, b"{}");
-//! The file is now an input, so no output replaces it.
+//! // The file is now an input, so no output replaces it.
 //! assert!(sdg_files::write(&path, b"[]").is_err());
 //! # std::fs::remove_dir_all(&folder).ok();
 //! # Ok(())
