@@ -3,7 +3,7 @@
 /// The targets of a document's links and pictures, without titles; code is skipped.
 pub fn links(document: &str) -> Vec<String> {
     let mut targets = Vec::new();
-    for line in lines_outside_code(document) {
+    for line in lines_without_code(document) {
         let line = without_code_spans(line);
         let mut rest = line.as_str();
         while let Some(start) = rest.find("](") {
@@ -23,7 +23,7 @@ pub fn headings(document: &str) -> Vec<String> {
         let kept = title.trim().chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
         kept.map(|c| if c == ' ' { '-' } else { c }).collect::<String>().to_lowercase()
     };
-    lines_outside_code(document)
+    lines_without_code(document)
         .filter(|line| line.starts_with('#'))
         .map(|line| slug(line.trim_start_matches('#')))
         .collect()
@@ -39,12 +39,13 @@ pub fn named_files(document: &str, folders: &[&str]) -> Vec<String> {
     words.filter(is_path).filter(|word| !word.contains(['*', '…', '<', '$', '{'])).map(str::to_owned).collect()
 }
 
-fn lines_outside_code(document: &str) -> impl Iterator<Item = &str> {
+/// The lines of a document; those of code blocks are empty.
+pub(crate) fn lines_without_code(document: &str) -> impl Iterator<Item = &str> {
     let mut is_code = false;
-    document.lines().filter(move |line| {
+    document.lines().map(move |line| {
         let is_fence = line.trim_start().starts_with("```");
         is_code ^= is_fence;
-        !is_code && !is_fence
+        if is_code || is_fence { "" } else { line }
     })
 }
 

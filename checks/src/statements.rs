@@ -1,4 +1,4 @@
-//! What a Rust source computes, as far as its text shows.
+//! The statements of Rust sources: whether two versions of a program compute the same, as far as their text shows.
 
 use std::collections::BTreeMap;
 

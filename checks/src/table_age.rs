@@ -113,13 +113,15 @@ fn notes_on<'a>(text: &'a str, commit: &str) -> Vec<&'a str> {
 /// The words of a text that may be hashes of commits, with their places: hexadecimal, from seven digits on, with a digit
 /// and a letter.
 fn hashes(text: &str) -> Vec<(usize, usize, &str)> {
-    let mut found = Vec::new();
-    for word in text.split(|c: char| !c.is_ascii_alphanumeric()) {
+    let (mut found, mut start) = (Vec::new(), 0);
+    let is_end = |c: char| !c.is_ascii_alphanumeric();
+    for piece in text.split_inclusive(is_end) {
+        let word = piece.trim_end_matches(is_end);
         let is_hex = word.len() >= 7 && word.chars().all(|c| matches!(c, '0'..='9' | 'a'..='f'));
         if is_hex && word.contains(|c: char| c.is_ascii_digit()) && word.contains(|c: char| c.is_ascii_lowercase()) {
-            let start = word.as_ptr() as usize - text.as_ptr() as usize;
             found.push((start, start + word.len(), word));
         }
+        start += piece.len();
     }
     found
 }

@@ -1,5 +1,7 @@
 //! The tables of a Markdown document, and the marks that tell which measurement their figures come from.
 
+use crate::markdown::lines_without_code;
+
 /// A table of a document.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
@@ -42,22 +44,18 @@ pub fn tables(document: &str) -> Vec<Table> {
     // Sections by index, with the parents of each table's section: its paragraphs are complete at the end only.
     let mut open = vec![0_usize];
     let mut found: Vec<(Table, Vec<usize>)> = Vec::new();
-    let mut is_code = false;
     let mut is_in_table = false;
     let mut paragraph = String::new();
-    let lines: Vec<&str> = document.lines().collect();
+    let lines: Vec<&str> = lines_without_code(document).collect();
     for (idx, &line) in lines.iter().enumerate() {
         let here = *open.last().unwrap_or(&0);
-        let is_row = !is_code && line.starts_with('|');
+        let is_row = line.starts_with('|');
         let is_comment = line.trim_start().starts_with("<!--");
-        let is_text = !is_code && !is_row && !is_comment && !line.trim().is_empty() && !line.starts_with('#');
+        let is_text = !is_row && !is_comment && !line.trim().is_empty() && !line.starts_with('#');
         if !is_text && !paragraph.is_empty() {
             sections[here].paragraphs.push(std::mem::take(&mut paragraph));
         }
-        if line.trim_start().starts_with("```") {
-            is_code = !is_code;
-        } else if is_code {
-        } else if is_row {
+        if is_row {
             if !is_in_table && lines.get(idx + 1).is_some_and(|next| is_rule(next)) {
                 let own = idx.checked_sub(1).and_then(|above| mark_of(lines[above]));
                 let mark = own.or_else(|| open.iter().rev().find_map(|&section| sections[section].mark.clone()));

@@ -37,11 +37,6 @@ const UNTOUCHED_NM: f64 = 1.0;
 const TOLERANCE: f64 = 0.05;
 /// and of half a range some milliradians, or millimetres of the workspace.
 const RANGE_TOLERANCE: f64 = 0.01;
-/// The robot's controller overshoots an acceleration that reaches its limit within milliseconds: seed 906 is commanded 100 % and
-/// reaches 105.2 % in the mean of a window.
-const OVERSHOOT: f64 = 0.1;
-/// After a contact the controller stops the arm in place, as hard as it can; accelerations are compared again after this time, s.
-const SETTLING_SECS: f64 = 0.1;
 /// External torques at which a Franka stops where the table may push back, N·m, and how long it may take until it yields, s.
 const CONTACT_TORQUE_NM: [f64; 7] = [40.0, 40.0, 36.0, 36.0, 32.0, 28.0, 24.0];
 const MAX_CONTACT_SECS: f64 = 0.3;
@@ -87,7 +82,8 @@ impl Probed {
     fn look(&mut self, torque: &JointVector) {
         let Observation { q, dq, contact_torque, .. } = self.plant.observe();
         self.time_secs += 1e-3;
-        self.untouched_secs = if contact_torque.amax() > UNTOUCHED_NM { 0.0 } else { self.untouched_secs + 1e-3 };
+        let is_touched = contact_torque.amax() > UNTOUCHED_NM;
+        self.untouched_secs = if is_touched { 0.0 } else { self.untouched_secs + 1e-3 };
         let (time_secs, untouched_secs) = (self.time_secs, self.untouched_secs);
         let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
         let mut most = |what: &'static str, share: f64| {
@@ -111,7 +107,7 @@ impl Probed {
         let [middle, half] = [WORKSPACE.max_m + WORKSPACE.min_m, WORKSPACE.max_m - WORKSPACE.min_m];
         most("workspace", (tcp - middle / 2.0).component_div(&(half / 2.0)).amax());
 
-        if untouched_secs < SETTLING_SECS {
+        if is_touched {
             self.velocities.clear();
             self.accelerations.clear();
         }
@@ -289,11 +285,8 @@ fn main() -> Result<(), Failure> {
             let Largest { share, time_secs, untouched_secs } = largest;
             let most: &mut f64 = shares.entry(*what).or_default();
             *most = most.max(*share);
-            let tolerance = match *what {
-                "position of joints" | "workspace" => RANGE_TOLERANCE,
-                "acceleration of joints" => OVERSHOOT,
-                _ => TOLERANCE,
-            };
+            let tolerance =
+                if ["position of joints", "workspace"].contains(what) { RANGE_TOLERANCE } else { TOLERANCE };
             if share.is_nan() || *share > 1.0 + tolerance {
                 let fault = format!(
                     "{seed}: {kind}: {ended}: the limit of the {what} is broken: {share:.3} at {time_secs:.3} s, \

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// Checks the output of `sdg ARGUMENTS --json`: one object, or one a line.
+/// Checks the output of `sdg ARGUMENTS --json`: one object, or one per line.
 pub fn assert_fields_are_documented(arguments: &[impl AsRef<OsStr>], printed: &[u8]) {
     let words: Vec<&str> = arguments.iter().filter_map(|word| word.as_ref().to_str()).collect();
     let Some(verb) = words.first().copied().filter(|_| words.contains(&"--json")) else { return };

@@ -142,7 +142,9 @@ impl LabelOffset {
         let Self { agreeing, along_percent, across_percent, px, turn_deg, totals } = self;
         format!(
             "the labels mark a different grasp from the taught one: {} detections that hit no instance have the same \
-             offset from their labels, {px:.1} px ({along_percent:.0} % of the diagonal along the label, {across_percent:.0} % across) and {turn_deg:.0}°; with the labels moved by this offset, {} parts are found and {} detections are wrong",
+             offset from their labels, {px:.1} px ({along_percent:.0} % of the diagonal along the label, \
+             {across_percent:.0} % across) and {turn_deg:.0}°; with the labels moved by this offset, {} parts are found \
+             and {} detections are wrong",
             agreeing, totals.found, totals.wrong
         )
     }

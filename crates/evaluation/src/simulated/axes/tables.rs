@@ -112,7 +112,9 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
     }
     let lead = format!(
         "Instances of the part that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
-         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are matched one to one. Each axis has its own pictures, the same for every model. The models do not know the camera's height."
+         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are \
+         matched one to one. Each axis has its own pictures, the same for every model. The models do not know the \
+         camera's height."
     );
     (format!("found, {}", way.name()), lead, table)
 }
