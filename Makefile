@@ -37,14 +37,15 @@ test-guides: setup ## Runs the guides' commands, those that take long too
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
 
-wheel: setup ## Builds the Python package's wheel into target/wheels (maturin from PyPI)
-	@scripts/python/wheel.sh
+wheel: setup ## Builds the Python package's wheel into target/wheels (maturin from PyPI; MANYLINUX=1: one that runs from glibc 2.31 on, in target/packages/wheel, also with ARCH=arm64; TRY=1: used in Debian 11; root)
+	@$(if $(MANYLINUX),ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/wheel.sh,scripts/python/wheel.sh)
 
 test-python: wheel ## Tests the wheel in a clean environment: the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
 	@scripts/python/test.sh $(PYTEST)
 
-capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's and CMake's files
+capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's and CMake's files (TRY=1: used in a clean Debian; root)
 	@scripts/c/install.sh target/capi
+	@$(if $(TRY),scripts/c/try.sh target/capi)
 
 test-c: wheel capi ## Tests the C library: programs in C and C++ under valgrind, the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
 	@scripts/c/test.sh $(PYTEST)

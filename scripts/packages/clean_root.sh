@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes a Debian system without any file of this project. Usage: clean_root.sh RELEASE FOLDER
+# Makes a Debian system without any file of this project. Usage: clean_root.sh RELEASE FOLDER [PACKAGE,PACKAGE…]
 set -euo pipefail
 
 "$(dirname "$0")/../install.sh" mmdebstrap
 rm -rf "$2"
-mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' "$1" "$2"
+mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' ${3:+--include="$3"} "$1" "$2"

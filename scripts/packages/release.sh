@@ -18,16 +18,16 @@ export AUDITABLE=1
 for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/deb.sh
     ARCH=$arch scripts/packages/tarball.sh
+    ARCH=$arch scripts/packages/wheel.sh
 done
 scripts/packages/image.sh
 scripts/packages/windows.sh
-scripts/python/wheel.sh
 
 out=target/packages/release/$version
 rm -rf "$out"
 mkdir -p "$out"
 cp target/packages/deb/*_"$version"_*.deb target/packages/tarball/*-"$version"-*.tar.xz target/packages/image/*-"$version"-*.oci.tar \
-    target/packages/windows/*-"$version"-*.zip target/wheels/single_demo_grasp-"$version"-*.whl "$out"
+    target/packages/windows/*-"$version"-*.zip target/packages/wheel/single_demo_grasp-"$version"-*.whl "$out"
 scripts/packages/sbom.sh "$out/single-demo-grasp-$version.cdx.json"
 (cd "$out" && sha256sum -- * >SHA256SUMS && sha256sum --check --quiet SHA256SUMS)
 echo "release: $out"

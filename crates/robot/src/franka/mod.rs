@@ -13,7 +13,7 @@ mod hand_worker;
 mod real_time;
 
 use std::ops::ControlFlow;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
@@ -37,6 +37,8 @@ pub use real_time::{Scheduling, check_real_time};
 /// Maximum duration of every wait for the robot. A real robot stops by itself after 20 ms; a server in lockstep waits a
 /// second for a lost packet and then continues.
 const TIMEOUT: Duration = Duration::from_secs(3);
+/// Maximum delay of a state behind an answer over TCP.
+const MAX_LATE: Duration = Duration::from_secs(1);
 /// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
 const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
 const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];
@@ -261,7 +263,11 @@ impl Arm for FrankaArm {
     }
 
     fn recover(&mut self) -> Result<()> {
-        self.robot.automatic_error_recovery().map_err(|error| self.error(error))
+        self.robot.automatic_error_recovery().map_err(|error| self.error(error))?;
+        // States from before the answer may still be on their way; the next motion must not begin with one of them.
+        let deadline = Instant::now() + MAX_LATE;
+        while matches!(self.state()?.mode, ArmMode::Reflex | ArmMode::Recovering) && Instant::now() < deadline {}
+        Ok(())
     }
 }
 

@@ -128,12 +128,64 @@ impl TrajectoryArm {
         Ok(watch.observe(&state).cloned())
     }
 
+    /// Waits for the end of a motion of the arm, or for a reason to cancel it.
+    fn motion_end(
+        &mut self,
+        goal: &mut Goal,
+        deadline: Instant,
+        watch: &mut Watch,
+    ) -> Result<(GoalEnd, FollowJointTrajectoryResult)> {
+        let mut seen_secs = f64::NAN;
+        loop {
+            if let Some(ended) = self.motions.result(goal, POLL_INTERVAL).map_err(|error| self.lost(error))? {
+                return Ok(ended);
+            }
+            while let Ok(Some(_)) = self.motions.feedback(goal, Duration::ZERO) {
+                self.num_feedback += 1;
+            }
+            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
+                return Err(RobotError::Stopped(reason));
+            }
+            if Instant::now() > deadline {
+                let why = format!("the motion did not end {MAX_DELAY_SECS:.0} s after its time");
+                return Err(RobotError::Stopped(StopReason::Watchdog(why)));
+            }
+        }
+    }
+
+    /// Waits for the end of a motion of the hand, or for a reason to cancel it.
+    fn hand_end(&self, mut goal: Goal, watch: &mut Watch) -> Result<(GoalEnd, GripperCommandResult)> {
+        let deadline = Instant::now() + MAX_HAND;
+        let mut seen_secs = f64::NAN;
+        loop {
+            let ended = self.gripper.result(&mut goal, POLL_INTERVAL);
+            if let Some(ended) = ended.map_err(|error| RobotError::Hand(error.to_string()))? {
+                return Ok(ended);
+            }
+            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
+                return Err(RobotError::Stopped(reason));
+            }
+            if Instant::now() > deadline {
+                let secs = MAX_HAND.as_secs();
+                return Err(RobotError::Hand(format!("{} did not end within {secs} s", self.gripper.name())));
+            }
+        }
+    }
+
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
         self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
         // The controller holds the position at which the arm stopped.
         self.commanded = None;
         Ok(())
+    }
+}
+
+/// The error of a motion that was then cancelled: after a stop that failed, the robot may still move.
+fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
+    match (error, cancelled) {
+        (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,
+        (error, _) => error,
     }
 }
 
@@ -192,28 +244,12 @@ impl Arm for TrajectoryArm {
         };
         self.commanded = None;
         let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
-        let mut seen_secs = f64::NAN;
-        let (end, result) = loop {
-            if let Some(ended) = self.motions.result(&mut goal, POLL_INTERVAL).map_err(|error| self.lost(error))? {
-                break ended;
-            }
-            while let Ok(Some(_)) = self.motions.feedback(&goal, Duration::ZERO) {
-                self.num_feedback += 1;
-            }
-            let stop = match self.observe(watch, &mut seen_secs) {
-                Ok(None) if Instant::now() > deadline => {
-                    Some(StopReason::Watchdog(format!("the motion did not end {MAX_DELAY_SECS:.0} s after its time")))
-                }
-                Ok(stop) => stop,
-                Err(error) => {
-                    // The motion must not continue without being observed.
-                    let _ = self.cancel(&mut goal);
-                    return Err(error);
-                }
-            };
-            if let Some(reason) = stop {
-                self.cancel(&mut goal)?;
-                return Err(RobotError::Stopped(reason));
+        let (end, result) = match self.motion_end(&mut goal, deadline, watch) {
+            Ok(ended) => ended,
+            Err(error) => {
+                // The motion must not continue without being observed.
+                let cancelled = self.cancel(&mut goal);
+                return Err(more_serious(error, cancelled));
             }
         };
         let said = format!("{}: {} {}", self.motions.name(), error_name(result.error_code), result.error_string);
@@ -268,22 +304,14 @@ impl Arm for TrajectoryArm {
     }
 
     fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
-        watch.allow_silence(MAX_SILENCE_SECS);
-        let Some((command, mut goal)) = self.hand.take() else { return self.hand() };
-        let deadline = Instant::now() + MAX_HAND;
-        let mut seen_secs = f64::NAN;
-        let failed = |error: RosError| RobotError::Hand(error.to_string());
-        let (end, result) = loop {
-            if let Some(ended) = self.gripper.result(&mut goal, POLL_INTERVAL).map_err(failed)? {
-                break ended;
-            }
-            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
-                self.gripper.cancel(&goal, ANSWER).map_err(failed)?;
-                return Err(RobotError::Stopped(reason));
-            }
-            if Instant::now() > deadline {
-                let secs = MAX_HAND.as_secs();
-                return Err(RobotError::Hand(format!("{} did not end within {secs} s", self.gripper.name())));
+        let Some((command, goal)) = self.hand.take() else { return self.hand() };
+        let (end, result) = match self.hand_end(goal, watch) {
+            Ok(ended) => ended,
+            Err(error) => {
+                // The fingers may still move. If they cannot be stopped now, `stop` tries it again.
+                self.hand = Some((command, goal));
+                let stopped = self.stop();
+                return Err(more_serious(error, stopped));
             }
         };
         let opening_m = result.position / self.config.gripper_position_per_m;
@@ -321,12 +349,11 @@ impl Arm for TrajectoryArm {
 
     /// Stops the hand; a motion of the arm ends with the call that started it.
     fn stop(&mut self) -> Result<()> {
-        match self.hand.take() {
-            Some((_, goal)) => {
-                self.gripper.cancel(&goal, ANSWER).map(drop).map_err(|error| RobotError::Hand(error.to_string()))
-            }
-            None => Ok(()),
+        if let Some((_, goal)) = &self.hand {
+            self.gripper.cancel(goal, ANSWER).map_err(|error| RobotError::Hand(error.to_string()))?;
+            self.hand = None;
         }
+        Ok(())
     }
 
     /// Recovers nothing, because errors are recovered at the arm's driver.

@@ -1,5 +1,7 @@
 //! A relay between a robot and its client that forwards everything except the states and commands that a test changes.
+//! States of a standing arm arrive late, later than the robot's answers over TCP.
 
+use std::collections::VecDeque;
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::sync::{Arc, Mutex};
@@ -14,6 +16,9 @@ use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 pub type ChangeState = Box<dyn FnMut(u64, &RobotState) -> Vec<Vec<u8>> + Send>;
 /// Function that decides by its index whether a command of a moving arm is forwarded.
 pub type PassCommand = Box<dyn FnMut(u64) -> bool + Send>;
+
+/// Number of cycles by which the states of a standing arm are late.
+const NUM_LATE: usize = 30;
 
 /// The unchanged datagram of a state.
 pub fn unchanged(state: &RobotState) -> Vec<u8> {
@@ -75,16 +80,20 @@ fn pass_states(
     source: &Mutex<Option<SocketAddr>>,
     mut change: ChangeState,
 ) {
-    let (mut buffer, mut num_moving) = ([0; STATE_SIZE_V5], 0);
+    let (mut buffer, mut num_moving, mut late) = ([0; STATE_SIZE_V5], 0, VecDeque::new());
     while let Ok((length, robot)) = from.recv_from(&mut buffer) {
         *source.lock().unwrap() = Some(robot);
         let state = RobotState::decode(&buffer[..length], Version::V5).unwrap();
         let datagrams = match state.robot_mode {
             RobotMode::Move => {
                 num_moving += 1;
+                late.clear();
                 change(num_moving, &state)
             }
-            _ => vec![unchanged(&state)],
+            _ => {
+                late.push_back(unchanged(&state));
+                if late.len() > NUM_LATE { late.pop_front().into_iter().collect() } else { Vec::new() }
+            }
         };
         let client = SocketAddr::from((Ipv4Addr::LOCALHOST, *client_port.lock().unwrap()));
         for datagram in datagrams {
