@@ -8,16 +8,17 @@ Arrays are numpy arrays of dtype uint8 and shape (height, width, 3), or (height,
 copied once, and the GIL is released during computations. Units are in the names: metres (`_m`), degrees (`_deg`).
 """
 
+from __future__ import annotations
+
 import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from operator import index
 from pathlib import Path
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _native
 from ._detections import Detection, Detections, Grasp, Pose, TrackedPart
@@ -69,8 +70,13 @@ __all__ = [
     "teach",
 ]
 
+if TYPE_CHECKING:
+    # numpy 1.19, which Debian 11 has, lacks this module.
+    import numpy.typing as npt
+
+    _Array = npt.NDArray[np.uint8]
+
 _Path = Union[str, "PathLike[str]"]
-_Array = npt.NDArray[np.uint8]
 _Region = Union[None, str, Sequence[int]]
 
 _MAX_THREADS = 1024

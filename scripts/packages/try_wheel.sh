@@ -11,7 +11,7 @@ cp "$wheel" "$root/opt"
 cp scripts/packages/first_grasp.sh "$root/first_grasp.sh"
 cp -r datasets/demonstrations "$root/opt/photos"
 inside() { unshare --mount --net --pid --fork chroot "$root" "$@"; }
-as_nobody() { inside setpriv --reuid nobody --regid nogroup --clear-groups env HOME=/nonexistent "$@"; }
+as_nobody() { unshare --mount --net --pid --fork chroot --userspec nobody:nogroup "$root" /usr/bin/env HOME=/nonexistent "$@"; }
 
 start=$(date +%s.%N)
 inside pip3 install --quiet --no-index "/opt/$(basename "$wheel")"
