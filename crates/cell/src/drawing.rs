@@ -4,9 +4,7 @@ use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Keypoint};
 use sdg_grasp::{Differences, GraspDetection, SearchRegion};
-use sdg_report::{
-    Color, DetectionMark, Pen, Verdict, draw_box, draw_detection, draw_label, draw_polygon, label_bounds, line_width,
-};
+use sdg_report::{Color, DetectionMark, Pen, Verdict, draw_box, draw_label, draw_polygon, label_bounds, line_width};
 
 use crate::live_detection::Part;
 
@@ -25,26 +23,24 @@ pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbIm
 /// tag covers if there is room; the other refused ones get only a box.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
-    detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,
+    detections: impl Iterator<Item = &'a GraspDetection>,
     min_score: f64,
     reasons: &[(&GraspDetection, String)],
 ) {
-    // In reverse order, so that the best detection is on top.
-    for detection in detections.rev() {
-        if detection.score < min_score && !reasons.is_empty() {
-            let width = line_width(drawn);
-            let explained = reasons.iter().any(|(known, _)| *known == detection);
-            let share = if explained { 1.0 } else { 0.5 };
-            let pen = Pen::new(Color::REFUSED).width(share * width).dashed(4.0 * width, 3.0 * width);
-            draw_box(drawn, &detection.bbox, &pen);
-            if let Some(outline) = detection.outline.as_ref().filter(|_| explained) {
-                draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
-            }
-            continue;
+    let (boxed, marked): (Vec<_>, Vec<_>) =
+        detections.partition(|detection| detection.score < min_score && !reasons.is_empty());
+    for detection in boxed.into_iter().rev() {
+        let width = line_width(drawn);
+        let explained = reasons.iter().any(|(known, _)| *known == detection);
+        let share = if explained { 1.0 } else { 0.5 };
+        let pen = Pen::new(Color::REFUSED).width(share * width).dashed(4.0 * width, 3.0 * width);
+        draw_box(drawn, &detection.bbox, &pen);
+        if let Some(outline) = detection.outline.as_ref().filter(|_| explained) {
+            draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
         }
-        draw_numbered(drawn, detection, detection.score >= min_score, None);
     }
-    let mut taken = Vec::new();
+    let marked: Vec<_> = marked.into_iter().map(|detection| (detection, detection.score >= min_score, None)).collect();
+    let mut taken = draw_marked(drawn, &marked);
     for (detection, reason) in reasons {
         draw_reason(drawn, detection, reason, &mut taken);
     }
@@ -52,9 +48,10 @@ pub fn draw_detections<'a>(
 
 /// Draws the visible parts of a frame, the best on top, with their scores and their track numbers, counted from 1.
 pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
-    for part in parts.iter().rev().filter(|part| part.is_seen(min_score)) {
-        draw_numbered(drawn, &part.found.detection, true, part.track.map(|(number, ..)| number + 1));
-    }
+    let seen = parts.iter().filter(|part| part.is_seen(min_score));
+    let marked: Vec<_> =
+        seen.map(|part| (&part.found.detection, true, part.track.map(|(number, ..)| number + 1))).collect();
+    draw_marked(drawn, &marked);
 }
 
 /// Draws the border of the searched region, unless the whole picture is searched.
@@ -64,23 +61,27 @@ pub fn draw_region(drawn: &mut RgbImage, region: Option<&SearchRegion>) {
     draw_box(drawn, &region.bounds(), &Pen::new(Color::NEUTRAL).width(width).dashed(8.0 * width, 4.0 * width));
 }
 
-fn draw_numbered(drawn: &mut RgbImage, detection: &GraspDetection, is_accepted: bool, number: Option<u64>) {
-    let keypoints: Vec<Keypoint> = detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
-    let verdict = match (is_accepted, detection.agreement) {
-        (false, _) => Verdict::Refused,
-        (true, Some(_)) => Verdict::Verified,
-        (true, None) => Verdict::Unchecked,
-    };
-    let mark = DetectionMark {
+/// Draws detections with whether they are accepted and their numbers; returns the areas of their tags.
+fn draw_marked(drawn: &mut RgbImage, detections: &[(&GraspDetection, bool, Option<u64>)]) -> Vec<BoundingBox> {
+    let keypoints: Vec<Vec<Keypoint>> = detections
+        .iter()
+        .map(|(detection, ..)| detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect())
+        .collect();
+    let marks = detections.iter().zip(&keypoints).map(|((detection, is_accepted, number), keypoints)| DetectionMark {
         bounds: Some(detection.bbox),
         outline: detection.outline.as_ref(),
-        keypoints: &keypoints,
+        keypoints,
         grasp: Some(detection.grasp),
         score: detection.score,
-        verdict,
-        number,
-    };
-    draw_detection(drawn, &mark);
+        verdict: match (is_accepted, detection.agreement) {
+            (false, _) => Verdict::Refused,
+            (true, Some(_)) => Verdict::Verified,
+            (true, None) => Verdict::Unchecked,
+        },
+        number: *number,
+    });
+    let marks: Vec<_> = marks.collect();
+    sdg_report::draw_detections(drawn, &marks)
 }
 
 /// Colours of the dots where edges or the surface differ; they differ in lightness, too, for colour-blind users.

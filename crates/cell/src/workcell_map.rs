@@ -78,13 +78,18 @@ impl WorkcellMap {
         let width = (self.x_m[1] - self.x_m[0]) * PX_PER_M + 2.0 * FRAME_PX;
         let height = (self.y_m[1] - self.y_m[0]) * PX_PER_M + 2.0 * FRAME_PX + KEY_PX;
         let mut image = RgbImage::from_pixel(width.ceil() as u32, height.ceil() as u32, GROUND);
-        let most = reach.squares.iter().map(|square| square.num_turns).max().unwrap_or(0).max(1);
+        let most = reach.squares.iter().map(|square| square.num_turns).max().unwrap_or(0);
         for square in &reach.squares {
             let half = 0.5 * reach.grid_m;
             let (x, y) = (square.at_m.x, square.at_m.y);
             let corners = [[-half, -half], [half, -half], [half, half], [-half, half]];
             let corners = corners.map(|[dx, dy]| Point2::new(x + dx, y + dy));
-            shade_polygon(&mut image, &self.polygon(&corners), REACHED, 0.45 * square.num_turns as f64 / most as f64);
+            shade_polygon(
+                &mut image,
+                &self.polygon(&corners),
+                REACHED,
+                0.45 * square.num_turns as f64 / most.max(1) as f64,
+            );
         }
         let mut labels = Labels::default();
         self.draw_lines(&mut image);

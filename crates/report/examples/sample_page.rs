@@ -10,7 +10,7 @@ use sdg_geometry::{GraspLine, PlanarGrasp, PlanarSimilarity, Polygon, median};
 use sdg_report::{
     Animation, AnimationOptions, AttemptSummary, Axis, Chart, Color, DetectionError, DetectionMark, Figure,
     GallerySize, KeyFigure, Report, Section, Series, ShareChart, Tone, Verdict, attempts_table, draw_demonstration,
-    draw_detection, outcome_matrix, shade_polygon,
+    draw_detections, outcome_matrix, shade_polygon,
 };
 
 const SIZE: (u32, u32) = (640, 480);
@@ -178,7 +178,7 @@ fn detections() -> Section {
             verdict: if refused { Verdict::Refused } else { Verdict::Verified },
             number: None,
         };
-        draw_detection(&mut picture, &mark);
+        draw_detections(&mut picture, &[mark]);
         Figure::photo(picture).caption(if refused {
             format!(
                 "Test image {idx}: no part in the picture; the network detected one, and the demonstration did \

@@ -51,7 +51,7 @@ pub use animation::{Animation, AnimationOptions, AnimationRecorder};
 pub use attempts::{AttemptSummary, DetectionError, attempts_table, outcome_matrix};
 pub use chart::{Axis, Chart, Matrix, Scale, Series, ShareChart};
 pub use draw::{
-    Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detection, draw_grasp_jaws,
+    Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detections, draw_grasp_jaws,
     draw_keypoints, draw_label, draw_line, draw_polygon, label_bounds, line_width, shade_polygon,
 };
 pub use error::ReportError;

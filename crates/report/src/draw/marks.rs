@@ -5,7 +5,8 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, Polygon};
 
 use super::{
-    Color, Pen, draw_box, draw_grasp_jaws, draw_keypoints, draw_label, draw_line, draw_polygon, shade_polygon,
+    Color, Pen, draw_box, draw_grasp_jaws, draw_keypoints, draw_label, draw_line, draw_polygon, label_bounds,
+    shade_polygon,
 };
 use crate::html::format_number;
 
@@ -89,32 +90,73 @@ pub fn draw_demonstration(
     }
 }
 
-/// Draws a detection: box, outline, keypoints, a tag with score and verdict, and the grasp as a gripper.
+/// Draws detections, ordered by decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with score and
+/// verdict. No tag covers another tag or the middle of a grasp if there is room for it at a corner of its box. Returns
+/// the areas of the tags.
 ///
 /// A refused detection has a dashed box and no gripper, because it is not grasped.
-pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
+pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec<BoundingBox> {
     let width = line_width(image);
-    let color = mark.verdict.color();
-    let refused = mark.verdict == Verdict::Refused;
+    // In reverse order, so that the best detection is on top.
+    marks.iter().rev().for_each(|mark| draw_untagged(image, mark));
+    let mut occupied: Vec<BoundingBox> = marks
+        .iter()
+        .filter_map(DetectionMark::grasped)
+        .map(|grasp| {
+            let half = 5.0 * width;
+            BoundingBox { x1: grasp.x - half, y1: grasp.y - half, x2: grasp.x + half, y2: grasp.y + half }
+        })
+        .collect();
+    let num_grasps = occupied.len();
+    for mark in marks {
+        let number = mark.number.map(|number| format!("part {number}: ")).unwrap_or_default();
+        let text = format!("{number}{} {}", format_number(mark.score, 2), mark.verdict.word());
+        let height_px = 5.6 * width;
+        let tag = |at: Point2<f64>| label_bounds(image, at, &text, height_px);
+        let covered = |tag: &BoundingBox| occupied.iter().map(|other| other.intersection(tag)).sum::<f64>();
+        let size = tag(Point2::origin());
+        let anchors = mark.tag_anchors(width, [size.width(), size.height()]);
+        let Some(at) = anchors.into_iter().min_by(|one, other| covered(&tag(*one)).total_cmp(&covered(&tag(*other))))
+        else {
+            continue;
+        };
+        occupied.push(tag(at));
+        draw_label(image, at, &text, mark.verdict.color(), height_px);
+    }
+    occupied.split_off(num_grasps)
+}
+
+fn draw_untagged(image: &mut RgbImage, mark: &DetectionMark<'_>) {
+    let width = line_width(image);
     if let Some(outline) = mark.outline {
         draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
     }
     if let Some(bounds) = &mark.bounds {
-        let pen = Pen::new(color).width(width);
-        draw_box(image, bounds, &if refused { pen.dashed(4.0 * width, 3.0 * width) } else { pen });
+        let pen = Pen::new(mark.verdict.color()).width(width);
+        let is_refused = mark.verdict == Verdict::Refused;
+        draw_box(image, bounds, &if is_refused { pen.dashed(4.0 * width, 3.0 * width) } else { pen });
     }
     draw_keypoints(image, mark.keypoints, &Pen::new(Color::NEUTRAL).width(0.7 * width));
-    if let Some(grasp) = mark.grasp.filter(|_| !refused) {
+    if let Some(grasp) = mark.grasped() {
         draw_grasp_jaws(image, &grasp, &Pen::new(Color::GRASP).width(width));
     }
-    let anchor = match (&mark.bounds, mark.grasp) {
-        (Some(bounds), _) => Point2::new(bounds.x1 - 0.4 * width, bounds.y1 - 0.9 * width),
-        (None, Some(grasp)) => grasp.center(),
-        (None, None) => return,
-    };
-    let number = mark.number.map(|number| format!("part {number}: ")).unwrap_or_default();
-    let text = format!("{number}{} {}", format_number(mark.score, 2), mark.verdict.word());
-    draw_label(image, anchor, &text, color, 5.6 * width);
+}
+
+impl DetectionMark<'_> {
+    /// The grasp, unless the detection is refused.
+    fn grasped(&self) -> Option<PlanarGrasp> {
+        self.grasp.filter(|_| self.verdict != Verdict::Refused)
+    }
+
+    /// Lower left corners of a tag of this width and height, the preferred one first: above the box, below it, and inside
+    /// it, each at the left and at the right; without a box, at the grasp.
+    fn tag_anchors(&self, line_width: f64, [width, height]: [f64; 2]) -> Vec<Point2<f64>> {
+        let Some(bounds) = &self.bounds else { return self.grasp.iter().map(PlanarGrasp::center).collect() };
+        let (beside, gap) = (0.4 * line_width, 0.9 * line_width);
+        let columns = [bounds.x1 - beside, bounds.x2 + beside - width];
+        let rows = [bounds.y1 - gap, bounds.y2 + gap + height, bounds.y1 + gap + height, bounds.y2 - gap];
+        rows.into_iter().flat_map(|y| columns.map(|x| Point2::new(x, y))).collect()
+    }
 }
 
 #[cfg(test)]
@@ -142,11 +184,30 @@ mod tests {
     #[test]
     fn a_gripper_is_drawn_only_where_the_robot_may_go() {
         let mut image = RgbImage::new(320, 240);
-        draw_detection(&mut image, &mark(Verdict::Verified));
+        draw_detections(&mut image, &[mark(Verdict::Verified)]);
         assert!(holds(&image, Color::GRASP) && holds(&image, Color::VERIFIED));
         let mut image = RgbImage::new(320, 240);
-        draw_detection(&mut image, &mark(Verdict::Refused));
+        draw_detections(&mut image, &[mark(Verdict::Refused)]);
         assert!(!holds(&image, Color::GRASP) && holds(&image, Color::REFUSED));
+    }
+
+    #[test]
+    fn tags_of_close_detections_cover_neither_each_other_nor_a_grasp() {
+        let at = |x: f64, y: f64| {
+            let bounds = BoundingBox::new(x, y, x + 60.0, y + 40.0).unwrap();
+            let grasp = PlanarGrasp { x: x + 30.0, y: y + 20.0, angle: Angle::ZERO, width: 30.0 };
+            DetectionMark { bounds: Some(bounds), grasp: Some(grasp), ..mark(Verdict::Verified) }
+        };
+        let marks = [at(100.0, 100.0), at(110.0, 104.0), at(90.0, 130.0), at(95.0, 60.0)];
+        let mut image = RgbImage::new(320, 240);
+        let tags = draw_detections(&mut image, &marks);
+        assert_eq!(tags.len(), marks.len());
+        for (i, tag) in tags.iter().enumerate() {
+            assert!(tags[..i].iter().all(|other| other.intersection(tag) == 0.0), "{tags:?}");
+            assert!(marks.iter().all(|mark| !tag.contains(&mark.grasp.unwrap().center())), "{tags:?}");
+        }
+        // The best one has the preferred place, above the left corner of its box.
+        assert!(tags[0].y2 < 100.0 && (tags[0].x1 - 100.0).abs() < 2.0, "{tags:?}");
     }
 
     #[test]

@@ -13,7 +13,7 @@ mod shapes;
 
 pub use contact_sheet::contact_sheet;
 pub use label::{draw_label, label_bounds};
-pub use marks::{DetectionMark, Verdict, draw_demonstration, draw_detection, line_width};
+pub use marks::{DetectionMark, Verdict, draw_demonstration, draw_detections, line_width};
 pub use shapes::{draw_box, draw_grasp_jaws, draw_keypoints, draw_line, draw_polygon, shade_polygon};
 
 /// An sRGB colour, red first.
