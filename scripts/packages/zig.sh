@@ -30,9 +30,9 @@ if [ -n "${AUDITABLE:-}" ]; then
 fi
 
 zig_cargo() {
-    local command=$1
+    local command=$1 runner=()
     shift
-    env PATH="$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" \
-        "CARGO_TARGET_$(tr a-z- A-Z_ <<<"$triple")_RUNNER=${emulated[*]}" \
+    [ ${#emulated[@]} = 0 ] || runner=("CARGO_TARGET_$(tr a-z- A-Z_ <<<"$triple")_RUNNER=${emulated[*]}")
+    env PATH="$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" "${runner[@]}" \
         cargo-zigbuild "$command" --locked --profile "$profile" --target "$triple.$GLIBC" "${standard_library[@]}" "$@"
 }
