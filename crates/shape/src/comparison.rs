@@ -57,7 +57,7 @@ pub struct Comparison<'a> {
     pub surface: &'a Surface,
     /// Its edges over the whole area, compared in both directions.
     pub structure: &'a Structure,
-    /// The input of the comparing network.
+    /// The input of the likeness network.
     pub likeness: &'a Likeness,
     /// Its features, for the details network.
     pub details: &'a Details,
@@ -65,7 +65,7 @@ pub struct Comparison<'a> {
     pub(crate) mirrored: Option<&'a Rival>,
     pub(crate) turned: Option<&'a Rival>,
     pub(crate) profile: Option<&'a Profile>,
-    /// Poses of lower agreement are not given to that network.
+    /// Poses of lower agreement get no close look.
     pub min_agreement: f64,
     /// The image over which the demonstration is laid.
     pub picture: Picture<'a>,
@@ -120,7 +120,7 @@ pub struct Evidence {
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
-    /// `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`].
+    /// `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`], or by less than 0.3.
     pub close: Option<CloseLook>,
 }
 
@@ -154,8 +154,9 @@ impl Comparison<'_> {
         Evidence { close, ..evidence }
     }
 
-    /// `pose`, or another turn at which the part resembles itself if the distinguishing features favour it. For a part
-    /// of revolution, its position along the axis and its end, as found from the profile. Scales stay in `scales`.
+    /// `pose`, or the pose of another rotation at which the part resembles itself, if the distinguishing features
+    /// favour that. For a part of revolution, `pose` with the position along the axis and the direction of the axis
+    /// found from the profile. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
         if self.agreement(pose).both() < MIN_TURN_AGREEMENT {
             return *pose;
@@ -232,8 +233,8 @@ impl Comparison<'_> {
         self.template.refine(self.picture.field, start).image_from_demonstration
     }
 
-    /// `refined` (from `start` by edges), or a nearby pose of higher agreement if its agreement is poor. Scales stay in
-    /// `scales`.
+    /// `refined` (from `start` by edges), or a nearby pose of higher agreement if the agreement of `refined` is poor.
+    /// Scales stay in `scales`.
     pub fn refine_pose(
         &self,
         start: &PlanarSimilarity,

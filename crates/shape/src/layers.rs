@@ -20,7 +20,7 @@ pub(crate) const fn layer(inputs: usize, outputs: usize, stride: usize) -> Layer
     Layer { inputs, outputs, stride }
 }
 
-/// Weights by input, then by output; and the bias.
+/// Weights by tap, input and output; and the bias.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     pub(crate) weights: Vec<f32>,

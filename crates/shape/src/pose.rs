@@ -1,10 +1,9 @@
-//! A pose of the template during refinement, about the part's centre, where turning and scaling do
-//! not shift it.
+//! A pose of the template during refinement, given about the part's centre, which rotation and scaling do not move.
 
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-/// The position of the part's centre in the image, its turn and its scale.
+/// The position of the part's centre in the image, the part's angle and its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     /// In image pixels.

@@ -15,8 +15,8 @@ use crate::gradient_field::GradientField;
 use crate::revolution::Revolution;
 use crate::template::ShapeTemplate;
 
-/// Shifts along the axis at which the profile is compared with the picture, in part lengths: more than a thread's pitch
-/// in both directions.
+/// Number of shifts along the axis in each direction at which the profile is compared with the picture, and their step
+/// in part lengths. Together they exceed a thread's pitch.
 const NUM_SHIFTS: i32 = 4;
 const SHIFT: f64 = 0.03;
 /// Largest further movement, and minimum gain of agreement.
@@ -165,7 +165,7 @@ mod tests {
             let found = profile.share_of(&field, &pose, shift);
             assert!((found - share).abs() < 0.08, "{share}: {found}");
         }
-        // A movement away from the outline and back has no share.
+        // If the shift leads away from the outline, the share is 0.
         assert_eq!(profile.share_of(&field, &PlanarSimilarity::IDENTITY.shifted(shift), shift), 0.0);
     }
 

@@ -43,8 +43,9 @@ const MIN_GAIN_BY_TURN: f64 = 0.1;
 /// A window differs if the other's edges correlate with its own by less than this.
 const SAME: f32 = 0.6;
 
-/// The poses at which `template` resembles the photo most, from its own pixels to the cut-out's: the best by agreement
-/// with the photo's gradients, among the poses `further` and all turns about the centre, for which `counts` holds.
+/// The poses, from the template's own pixels to the cut-out's, at which `template` resembles the photo most. They are
+/// the best by agreement with the photo's gradients among the poses `further` and the rotations about the centre; only
+/// poses for which `counts` holds are considered.
 fn resembling(
     template: &ShapeTemplate,
     field: &GradientField,
@@ -77,12 +78,12 @@ fn resembling(
     starts
 }
 
-/// Another part that may lie there instead.
+/// An alternative explanation of the picture: the mirror image, or the part itself turned.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     close_up: CloseUp,
     template: ShapeTemplate,
-    /// The pose of greatest resemblance with the photo: from its own pixels to the cut-out's.
+    /// The poses of greatest resemblance with the photo: from the rival's own pixels to the cut-out's.
     starts: Vec<PlanarSimilarity>,
 }
 
@@ -153,7 +154,7 @@ impl Rival {
         best.map(|(turn, _)| self.template.captured(field, &turn, &REACH))
     }
 
-    /// The rival's possible pose near a pose of the photo, and its agreement there.
+    /// The rival's possible poses at a pose of the photo, one for each start, and its agreement at each.
     fn followed(&self, field: &GradientField, pose: &PlanarSimilarity) -> Vec<(PlanarSimilarity, f64)> {
         parallel::map(&self.starts, |start| self.template.captured_roughly(field, &pose.compose(start), &REACH))
     }
@@ -179,7 +180,7 @@ impl CloseUp {
         self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
 
-    /// The photo compared with this rival, which lies there by `own_from_photo`.
+    /// The photo compared with this rival, which lies on the photo by `own_from_photo`.
     fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let both = self.laid_over(photo, own_from_photo);
         let fit = both.photos.fit(&seen.fits);
@@ -193,7 +194,7 @@ impl CloseUp {
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
-        // Each picture shows its part alone.
+        // Outside its part each picture has no gradients.
         let of_rival = gradients.only(|i| depth[i] > -4.0);
         let of_photo = photo.gradients.clone().only(|i| photo.depth[i] > -4.0);
         let photos = Differing::new(&photo.expected, &of_rival);

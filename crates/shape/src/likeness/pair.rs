@@ -11,14 +11,14 @@ pub const SIDE: usize = 64;
 pub const NUM_CHANNELS: usize = 8;
 /// The part's longer side in the input; the surroundings of the part show whether its outline is there.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
-/// Mean brightness of the part, in photo and picture, after exposure is normalised; four times this value is white, and
-/// brighter values are clipped.
+/// Mean brightness of the part, in photo and picture, after exposure is normalised. Values above `MAX`, four times this
+/// value, are clipped.
 const MEAN: f32 = 0.5;
 const MAX: f32 = 2.0;
 /// Limits the brightening of a black part.
 const DARK: f32 = 0.02;
 
-/// A photo's colours, and a flag for those that count.
+/// A photo's colours, and whether each pixel lies inside the outline.
 #[derive(Debug, Clone)]
 pub(super) struct Photo {
     frame: Frame,
@@ -75,7 +75,7 @@ fn values(photo: &[Option<[f32; 3]>], picture: &[Option<[f32; 3]>], inside: &[bo
     values
 }
 
-/// Colours with normalised exposure: their mean inside is [`MEAN`]; 0 where there is none.
+/// Colours with normalised exposure: their mean inside is [`MEAN`]; 0 where there is no colour.
 pub(crate) fn exposed_values(colors: &[Option<[f32; 3]>], inside: &[bool]) -> impl Iterator<Item = [f32; 3]> {
     let gain = gain(colors, inside);
     colors.iter().map(move |color| exposed(color, gain))
