@@ -209,7 +209,7 @@ impl Default for ScoreConfig {
 }
 
 impl Term {
-    /// The log-odds of a value: its distance from the neutral value, clamped to the range, times the weight.
+    /// The log-odds of a value: the value clamped to the range, minus the neutral value, times the weight.
     pub(crate) fn log_odds(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         self.weight * (value.clamp(low, high) - self.neutral)

@@ -34,7 +34,7 @@ pub struct Structure {
     num_regions: usize,
     /// Demonstration pixels per pixel of the level that is compared.
     pixel_size: f64,
-    /// All points lie within this distance of it, in demonstration pixels.
+    /// All points lie within `reach` of `center`, in demonstration pixels.
     center: Point2<f64>,
     reach: f64,
     config: StructureConfig,
@@ -123,8 +123,8 @@ impl Structure {
         edges.into_iter().filter(|(region, _)| differs(*region)).map(|(_, at)| at).collect()
     }
 
-    /// Calls `visit` for every point inside the image, with its place there, the demonstration's direction turned into
-    /// the image, and the image's direction.
+    /// Calls `visit` for every point inside the image, with its position there, the demonstration's direction rotated
+    /// by the pose, and the image's direction.
     fn compare(
         &self,
         field: &GradientField,
