@@ -322,15 +322,15 @@ impl GraspModel {
             .collect()
     }
 
-    /// The verdict's inputs for a place.
+    /// The verdict's inputs for a sighting.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
         let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
         Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
     }
 
-    /// The scores of all places in one picture of a sequence in which parts had the given size before, as in
-    /// [`Clues::log_size`].
+    /// The scores of all sightings in one picture of a sequence. `earlier_log_size` is the size of parts in earlier
+    /// pictures, as in [`Clues::log_size`].
     pub(crate) fn judge_in_sequence(
         &self,
         clues: &[Clues],
