@@ -1,5 +1,5 @@
-//! A network's score: the probability of the class, reduced if the heads contradict each other or if the place does not
-//! resemble the demonstration.
+//! A network's score: the probability of the class, reduced if the heads contradict each other, and reduced or
+//! increased by the comparison of the place with the demonstration.
 //!
 //! Box, keypoints, mask and orientation of a detection are separate estimates of the part's pose, which agree on the
 //! part. On another object, the box fits that object, and the demonstration at the pose of the other heads fills little
