@@ -253,7 +253,7 @@ impl GraspModel {
         Ok(level)
     }
 
-    /// Detections in an image at this slant, and the slant suggested by the best matches if `suggest` is set.
+    /// Detections in an image taken as level, and the slant suggested by the best matches if `suggest` is set.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let search = || {
             let searched = SearchedImage::of(image, shot, &self.demonstrations);
