@@ -100,9 +100,9 @@ pub struct Term {
 ///
 /// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
 /// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
-/// hue, size and bias were set by hand; with these ranges only table, added and mirror reject a pose alone, regardless
-/// of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing proposal
-/// counts, because a network also proposes look-alikes.
+/// hue, size and bias were set by hand; with these ranges only details, table, added and mirror reject a pose alone,
+/// regardless of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing
+/// proposal counts, because a network also proposes look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {

@@ -315,8 +315,8 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
-/// The shortening of a placed demonstration, and its direction in the image; `None` if the size is outside the search
-/// range.
+/// The shortening of a placed demonstration, and its direction in the image; `None` as for
+/// [`ShapeTemplate::foreshortening`](sdg_shape::ShapeTemplate::foreshortening).
 pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
@@ -324,8 +324,8 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
-/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if its
-/// size is outside the search range.
+/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if the
+/// window does not show the whole outline.
 pub(crate) fn agreement_in(
     searched: &SearchedImage<'_>,
     placed: &PlacedDemonstration<'_>,
@@ -346,8 +346,8 @@ pub(crate) fn agreement_in(
     Some(comparison.agreement(&comparison.refined_by_edges(&pose)).both())
 }
 
-/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` if its size is outside the search
-/// range.
+/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` if the demonstration is not
+/// searched at any size.
 pub(crate) fn differences(
     searched: &SearchedImage<'_>,
     demonstration_idx: usize,
