@@ -324,8 +324,8 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
-/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if the
-/// window does not show the whole outline.
+/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if a point
+/// of the outline has no position in the window.
 pub(crate) fn agreement_in(
     searched: &SearchedImage<'_>,
     placed: &PlacedDemonstration<'_>,

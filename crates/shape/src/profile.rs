@@ -22,7 +22,7 @@ const SHIFT: f64 = 0.03;
 /// Largest further movement, and minimum gain of agreement.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
 const MIN_GAIN: f64 = 0.05;
-/// Number of steps into which a shift is divided. Chosen by hand: the largest are of nine pixels.
+/// Number of steps into which a shift is divided. Chosen by hand: the largest shifts are of nine pixels.
 const SHARES: usize = 8;
 
 /// The edges along the outline of a part of revolution.

@@ -16,7 +16,8 @@ pub struct CloseLook {
     pub no_rim: f64,
     /// Mean energy of the edges inside the outline that are absent from the photo.
     pub added: f64,
-    /// The mirror image compared with the photo; `None` where the two are equal, or where the pose is not plausible.
+    /// The mirror image compared with the photo; `None` where the two are equal, for a part of revolution, and where
+    /// the pose is not plausible.
     pub mirrored: Option<RivalFit>,
 }
 

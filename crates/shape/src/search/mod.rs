@@ -156,8 +156,8 @@ const MIN_RESPONSE: f64 = 0.2;
 /// the distance of the next start. Derived from that, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
-/// Largest and smallest number of matches below `sure_agreement` that are refined again; in between, those that may be
-/// a part. Chosen by hand, not measured: more take more time.
+/// Largest and smallest number of matches below `sure_agreement` that are refined again. Between these limits, all that
+/// may be a part are refined. Chosen by hand, not measured: more take more time.
 const MAX_NUM_POLISHED: usize = 16;
 const MIN_NUM_POLISHED: usize = 3;
 /// Largest share of the part's area that two matches may share. Chosen by hand, not measured.
