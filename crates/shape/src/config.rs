@@ -191,7 +191,7 @@ impl Default for AgreementConfig {
 pub struct RefinementConfig {
     /// A pose of at least this agreement is not refined again.
     pub sure_agreement: f64,
-    /// Distance in pixels of further climbs from a pose whose agreement stays poor.
+    /// Distance in pixels between a pose whose agreement stays poor and the starts of further climbs.
     pub restart_px: f64,
     /// Minimum agreement for further climbs: no pose below it was the part.
     pub min_restart_agreement: f64,

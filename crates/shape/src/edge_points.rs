@@ -16,8 +16,8 @@ const MIN_COHERENCE: f32 = 0.5;
 /// cos 2φ, with the angle φ between an edge's normal and the outline's, above which the edge is the outline's own: up
 /// to 30°. Chosen by hand, not measured.
 const OUTLINE_ALIGNMENT: f64 = 0.5;
-/// Rounds of the re-weighting that balances the directions of the pose, and its largest factor. Chosen by hand, not
-/// measured.
+/// Rounds of the re-weighting that balances the directions of the pose, and its smallest and largest factor. Chosen by
+/// hand, not measured.
 const BALANCE_ROUNDS: usize = 3;
 const BALANCE_LIMITS: (f64, f64) = (0.4, 4.0);
 

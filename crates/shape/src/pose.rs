@@ -84,18 +84,18 @@ impl LevelMap {
         ]
     }
 
-    /// (cos, sin) of twice the turn.
+    /// (cos, sin) of twice the angle.
     pub(crate) fn double_turn(&self) -> [f32; 2] {
         self.double_turn
     }
 
-    /// Turns a direction.
+    /// Rotates a direction.
     #[inline]
     pub(crate) fn turn(&self, v: [f32; 2]) -> [f32; 2] {
         turned(v, self.turn)
     }
 
-    /// Turns a direction given at twice its angle.
+    /// Rotates a direction given at twice its angle.
     #[inline]
     pub(crate) fn turn_double(&self, v: [f32; 2]) -> [f32; 2] {
         turned(v, self.double_turn)

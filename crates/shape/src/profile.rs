@@ -19,7 +19,7 @@ use crate::template::ShapeTemplate;
 /// in part lengths. Together they exceed a thread's pitch.
 const NUM_SHIFTS: i32 = 4;
 const SHIFT: f64 = 0.03;
-/// Largest further movement, and minimum gain of agreement.
+/// Largest movement of a pose from its shifted start, and minimum gain of agreement.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
 const MIN_GAIN: f64 = 0.05;
 /// Number of steps into which a shift is divided. Chosen by hand: the largest shifts are of nine pixels.

@@ -110,7 +110,7 @@ impl ShapeTemplate {
         follow_in(&self.levels[self.agreement_level_idx..], field, range, from)
     }
 
-    /// As [`Self::follow`] at the levels finer than that, for a pose that was followed roughly.
+    /// As [`Self::follow`] at the levels finer than the agreement's, for a pose that was followed roughly.
     pub(crate) fn follow_finely(&self, field: &GradientField, range: &CaptureRange, rough: Pose) -> Pose {
         follow_in(&self.levels[..self.agreement_level_idx], field, range, rough)
     }

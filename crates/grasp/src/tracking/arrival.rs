@@ -1,4 +1,4 @@
-//! Detections of a search of an older frame, carried forward to the newest frame.
+//! Detections that a search found in an older frame, carried forward to the newest frame.
 //!
 //! ```text
 //! detections in frame k ─┬─ on a track, at its pose in frame k ─── near it: likeness, marks and network score are taken

@@ -33,7 +33,7 @@ const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0
 #[derive(Debug, Clone)]
 pub(super) struct Gradients {
     side: usize,
-    /// x and y of `v`, then of `v` at twice its angle.
+    /// x and y: in `signed` of `v`, in `doubled` of `v` at twice its angle.
     signed: [Vec<f32>; 2],
     doubled: [Vec<f32>; 2],
     /// Squared lengths, equal for both.

@@ -16,8 +16,8 @@ pub(crate) struct GradientLevel {
     height: usize,
     /// Each with a fourth number, so that it is read in one load.
     samples: Vec<[f32; 4]>,
-    /// Samples per row, and the number of samples between the level's first and the window's first, at that number per
-    /// row; 0 in a whole level.
+    /// Samples per row, and the index of the first sample in a level with that number of samples per row; 0 in a whole
+    /// level.
     stride: usize,
     before: usize,
     floor: f32,
@@ -27,7 +27,7 @@ pub(crate) struct GradientLevel {
 /// Values needed for every interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    /// Width and height, and the last pixel of each.
+    /// Width and height, and the indices of the last column and row.
     size: [f32; 2],
     last: [f32; 2],
     /// The last pixel that has a neighbour, and the index distance of that neighbour.

@@ -131,13 +131,13 @@ mod tests {
     fn the_same_part_looks_the_same_however_it_lies_and_is_lit() {
         assert_eq!(difference(&taught().beside(&photo(1.0), &PlanarSimilarity::IDENTITY)), 0.0);
         assert!(difference(&taught().beside(&photo(0.6), &PlanarSimilarity::IDENTITY)) < 0.05);
-        // The picture and the pose turned by a quarter.
+        // The picture and the pose rotated by 90°.
         let turned = image::imageops::rotate90(&photo(1.0));
         let pose =
             PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: f64::from(turned.width()), ty: 0.0 };
         let pair = taught().beside(&turned, &pose);
         assert!(difference(&pair) < 0.02, "{}", difference(&pair));
-        // After another half turn the corner is elsewhere.
+        // At a pose rotated by 180° the corner is elsewhere.
         let center = Point2::new(80.0, 60.0);
         let wrong = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
         assert!(difference(&taught().beside(&photo(1.0), &wrong)) > 0.1);

@@ -121,7 +121,8 @@ impl Found {
 /// Minimum size of the part at the swept level, in level pixels. Chosen by hand, not measured; the sweep's time
 /// grows with its fourth power.
 const SWEEP_EXTENT: f64 = 50.0;
-/// Edge points read at the swept level; every pose uses a sample of them. Chosen by hand, not measured.
+/// Maximum number of edge points read at the swept level; every pose uses a sample of them. Chosen by hand, not
+/// measured.
 const SWEEP_POINTS: usize = 128;
 /// Minimum number of edge points at a level; with fewer, the next finer level is swept. Chosen by hand, not measured.
 const MIN_SWEEP_POINTS: usize = 32;
@@ -146,8 +147,8 @@ const MAX_GAIN: f64 = 0.1;
 /// Two places overlap for certain if they share this much more of the area than matches may: the share is estimated
 /// from few points, and both places still move by pixels. Chosen by hand.
 const OVERLAP_MARGIN: f64 = 0.15;
-/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the largest ratio of their
-/// responses. Chosen by hand to save time: of ten photographed clips in a picture all are found.
+/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the smallest ratio of a
+/// response to the best one. Chosen by hand to save time: of ten photographed clips in a picture all are found.
 const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
