@@ -31,8 +31,8 @@ impl CheckConfig {
     /// Size range for a camera at the same distance as for the photo, as in the simulated workcell. If the size may
     /// shrink to four fifths, a lever that resembles the pendulum reaches an agreement of 0.66.
     pub const FIXED_HEIGHT_TOLERANCE: RangeInclusive<f64> = 0.97..=1.03;
-    /// Size range in a plan view, where the size is known; it includes look-alikes of another size, which are found and
-    /// then refused because of the size.
+    /// Size range in a plan view, where the size is known. It is wide enough that look-alikes of another size are
+    /// found, and then refused because of the size.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
     /// Default maximum number of detections in one picture. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
@@ -90,7 +90,8 @@ impl Default for CheckConfig {
 pub struct Term {
     /// Log-odds per unit of the value.
     pub weight: f64,
-    /// The neutral value: half-way between the medians of correct and wrong poses.
+    /// The value that contributes nothing; for most fitted terms half-way between the medians of correct and wrong
+    /// poses.
     pub neutral: f64,
     /// The range to which values are clamped, which limits the influence of this evidence.
     pub range: [f64; 2],

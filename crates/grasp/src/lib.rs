@@ -28,9 +28,8 @@
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! This crate deliberately has no files, robot or simulator, no threads of its own in detection except rayon's, and no
-//! clock there: the same code runs in a browser. Without the feature `teach` no autodiff, optimiser or augmentation is
-//! compiled.
+//! This crate deliberately has no files, robot or simulator. Detection has no clock and no threads except rayon's: the
+//! same code runs in a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:
 //!

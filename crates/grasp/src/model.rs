@@ -93,8 +93,8 @@ impl GraspModel {
         self
     }
 
-    /// The model with `num_points` edge points compared at each pose of a whole image's search; taught models use 64.
-    /// The calibration is unchanged.
+    /// The model with `num_points` edge points compared at each pose in the search of a whole image; taught models use
+    /// 64. The calibration is unchanged.
     ///
     /// # Errors
     /// A number of points outside 8 to 1024.
@@ -167,7 +167,7 @@ impl GraspModel {
         Ok(model)
     }
 
-    /// The bounds of a part's size relative to the nominal size that are searched.
+    /// The searched bounds of a part's size relative to the nominal size.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()
     }

@@ -1,4 +1,4 @@
-//! Edge directions compared in both directions: edges of the demonstration that the image lacks, and the reverse.
+//! Edge directions compared both ways: edges of the demonstration that the image lacks, and the reverse.
 //!
 //! [`crate::ShapeTemplate`] reads the image only at the demonstration's edges, so that a plate without holes agrees
 //! with every plate that also has holes. Here directions are compared at a grid of points over the whole part,
@@ -23,7 +23,7 @@ pub struct StructureAgreement {
     /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: these
     /// are neither covered nor of another part.
     pub visible: f64,
-    /// The share of the part that lies outside the image, in `[0, 1]`; the other values ignore it.
+    /// The share of the part that lies outside the image, in `[0, 1]`; `visible` ignores it.
     pub outside: f64,
 }
 

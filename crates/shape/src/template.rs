@@ -144,7 +144,7 @@ impl ShapeTemplate {
     }
 }
 
-/// How a level is read: fast during the search, exact during the climb.
+/// How a level is read: fast for the grid of poses, exact during the climb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LevelSampling {
     Nearest,

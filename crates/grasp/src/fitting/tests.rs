@@ -1,4 +1,4 @@
-//! Fits on two small parts in each half, with a few pictures and one constant of each kind.
+//! Fits on two small parts in each half, with a few pictures and two constants.
 
 use image::{Rgb, RgbImage};
 use sdg_demonstration::{AugmentationConfig, Augmenter};

@@ -19,7 +19,7 @@ pub const HEIGHT: u32 = 480;
 pub enum Solid {
     /// A round bar from `a` to `b`.
     Bar { a: [f64; 2], b: [f64; 2], radius: f64 },
-    /// A plate with upright sides, turned by `angle`.
+    /// A plate with upright sides, rotated by `angle`.
     Plate { center: [f64; 2], half: [f64; 2], angle: f64, height: f64 },
     /// An upright cylinder.
     Disc { center: [f64; 2], radius: f64, height: f64 },
