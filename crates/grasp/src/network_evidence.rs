@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use crate::network_calibration::{NetworkCalibration, log_odds};
 
 /// A score this far below the threshold, in log-odds, does not speak against the part: pictures score lower than
-/// held-out samples by about this much (the correct places of the housing by a median of 3.7, and 5.5;
-/// docs/decisions/013-base-weights.md).
+/// held-out samples by about this much (the correct places of the housing had a median score of 3.7 in pictures and 5.5
+/// in held-out samples; docs/decisions/013-base-weights.md).
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 

@@ -156,7 +156,8 @@ pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, 
     clues.iter().map(|clues| judge(clues, reference, config)).collect()
 }
 
-/// As [`judge_picture`], for a picture of a sequence in which parts had a size before, as [`Clues::log_size`].
+/// As [`judge_picture`], for a picture of a sequence; `earlier_log_size` is the size of parts in earlier pictures, as
+/// [`Clues::log_size`].
 pub(crate) fn judge_picture_of_sequence(
     clues: &[Clues],
     earlier_log_size: Option<f64>,

@@ -84,7 +84,7 @@ pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placem
 }
 
 impl Track {
-    /// Marks the track as the better pose of another one.
+    /// Marks the track as a better pose of another track's part.
     pub(super) fn replacing(mut self, id: u64) -> Self {
         self.standing = Standing::Arriving { replaces: Some(id) };
         self
