@@ -8,7 +8,7 @@ pub enum ShapeError {
     /// The outline is not an area: too few vertices, or a coordinate that is not a number.
     #[error("expected an outline of at least 3 finite vertices, found {found}")]
     OutlineDegenerate {
-        /// The content of the outline.
+        /// The number of vertices, or the vertex that is not finite.
         found: String,
     },
     /// The outline and the image overlap too little.

@@ -74,7 +74,7 @@ pub use ransac::{KeypointPair, RansacConfig, SimilarityFit, fit_similarity};
 pub use rotation::{RotationConfig, RotationEstimate, RotationEstimator, RotationMethod, RotationTemplate};
 pub use sift::Sift;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -30,7 +30,7 @@ const NUM_STARTS: usize = 4;
 /// distance from the centre.
 const APART_RAD: f64 = 0.2;
 const APART_SHARE: f64 = 0.25;
-/// Largest distance from a start in a picture, which shows the part in perspective.
+/// Largest distance of a refined pose from its start: a picture shows the part in perspective.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
 /// A rotation at which the photo's edges agree with themselves by at least this is tried in pictures. It is compared
 /// closely if its agreement with the picture is lower than that of the original pose by at most the second value.
@@ -195,7 +195,7 @@ impl CloseUp {
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
-        // Outside its part each picture has no gradients.
+        // The gradients of each picture outside its part are set to zero.
         let of_rival = gradients.only(|i| depth[i] > -4.0);
         let of_photo = photo.gradients.clone().only(|i| photo.depth[i] > -4.0);
         let photos = Differing::new(&photo.expected, &of_rival);
