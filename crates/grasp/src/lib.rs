@@ -132,7 +132,7 @@ pub use teach::{FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, 
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(all(doctest, feature = "teach"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -121,7 +121,7 @@ pub use structure::{Structure, StructureAgreement};
 pub use surface::Surface;
 pub use template::ShapeTemplate;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

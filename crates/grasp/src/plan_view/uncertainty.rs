@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct Uncertainty {
     /// Radius around the position in the plane, in metres.
     pub position_m: f64,
-    /// Angle in either direction.
+    /// Rotation in the plane, in either direction, in radians.
     pub yaw_rad: f64,
 }
 

@@ -266,8 +266,8 @@ impl ShapeSearch {
         matches
     }
 
-    /// Follows starts, the best first. Once parts are found, it follows further starts that resemble theirs; without a
-    /// part, no more.
+    /// Follows starts, the best first. If that finds parts, it also follows further starts that resemble the starts of
+    /// these parts; otherwise it stops.
     fn follow_best(&self, picture: &Picture<'_>, mut starts: Vec<Start>) -> Vec<Found> {
         let mut climbed_before: Vec<Pose> = Vec::new();
         let mut all = Vec::new();
