@@ -72,7 +72,7 @@ mod tests {
         let good = NetworkEvidence::new(&[0.9; 30], &[0.0; 30], &CALIBRATION);
         assert!((good.log_likelihood_ratio(0.95, &CALIBRATION) - 31f64.ln()).abs() < 1e-12);
         assert!((good.log_likelihood_ratio(0.0, &CALIBRATION) + 31f64.ln()).abs() < 1e-12);
-        // Half a log-odds further below the threshold than the margin, and half less.
+        // In log-odds, 0.25 is 2.5 below the threshold and 0.4 is 1.8 below it; the margin lies between.
         assert_eq!(good.log_likelihood_ratio(0.25, &CALIBRATION), 0.0);
         assert!(good.log_likelihood_ratio(0.4, &CALIBRATION) > 3.0);
         let poor = NetworkEvidence::new(&[0.9, 0.25, 0.0], &[0.9, 0.25, 0.0], &CALIBRATION);

@@ -45,7 +45,7 @@ pub struct Circumstances {
 pub struct ErrorLength {
     /// Error of a pose of full agreement, in pixels.
     pub pixels: f64,
-    /// Growth of the noise's logarithm per missing agreement.
+    /// Growth of the noise's logarithm per unit of missing agreement.
     pub by_disagreement: f64,
     /// Fraction of the marks' height times the slant.
     pub by_slant: f64,
