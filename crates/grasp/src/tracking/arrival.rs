@@ -84,7 +84,7 @@ pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placem
 }
 
 impl Track {
-    /// Marks the track as a better pose of another track's part.
+    /// Marks the track as a better pose of the part of track `id`.
     pub(super) fn replacing(mut self, id: u64) -> Self {
         self.standing = Standing::Arriving { replaces: Some(id) };
         self
