@@ -14,7 +14,7 @@ use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 /// 8.0 % before the correction.
 const SHIFT_PENALTY: f64 = 0.04;
 const TURN_PENALTY: f64 = 0.8;
-/// Steps of rotation (radians) and of ln of size that correspond to a step of one cell.
+/// Step of rotation (radians), and of ln of size, that corresponds to a step of one cell.
 const TURN_STEP: f64 = 0.1;
 const SIZE_STEP: f64 = 0.06;
 /// Minimum fraction of a cell inside the outline for the cell to be used.

@@ -6,9 +6,9 @@
 //! picture, pose ─ rotated upright by the pose, S×S ─────┘
 //! ```
 //!
-//! Both are cropped by the pose, so that the same point of the part is at the same pixel of both, and the network only
-//! judges their similarity. This question is the same for every part: the network is trained once, on generated parts
-//! and their look-alikes, and teaching only adds the demonstration.
+//! The picture is cropped by the pose, so that the same point of the part is at the same pixel of both images, and the
+//! network only judges their similarity. This question is the same for every part: the network is trained once, on
+//! generated parts and their look-alikes, and teaching only adds the demonstration.
 //!
 //! **Frame of a view.** A square about the centre of the outline's box, in the demonstration's direction, x right, y
 //! down.

@@ -60,7 +60,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The part inside `outline` of `image`, for the views of a network. Pixels outside the outline are ignored.
+    /// The part inside `outline` of `image`, for the views of a network. Pixels outside the outline do not count in the
+    /// differences.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &ComparisonConfig) -> Self {
         let input_px = config.input_px;
         let bounds = outline.bounds();

@@ -4,9 +4,9 @@
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`
 //!
 //! Generates PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of
-//! its photo's camera, and searches for it in one picture of each of the generator's conditions with the part, at
-//! 640x480 and at 320x240. The constants minimise the pinball loss at 68 % of the logarithm of the errors, with equal
-//! weight to each condition.
+//! its photo's camera, and searches for it in one picture of each of the generator's conditions with the part. Half of
+//! the parts have pictures of 640x480, the others of 320x240. The constants minimise the pinball loss at 68 % of the
+//! logarithm of the errors, with equal weight to each condition.
 
 use std::ops::ControlFlow;
 

@@ -46,7 +46,7 @@ impl BaseWeights {
         !self.imprint.is_empty()
     }
 
-    /// The network that compares places of pictures with the demonstration; `None` if the weights contain none.
+    /// The network that compares a picture at a pose with the demonstration; `None` if the weights contain none.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] if the values belong to another network.
@@ -85,8 +85,8 @@ impl BaseWeights {
 
     /// Sets the network's parameters. Layers frozen by the preset stay frozen.
     ///
-    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1, which is the same function. A
-    /// grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less, would be
+    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1 − eps, which is the same function.
+    /// A grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less, would be
     /// zero.
     ///
     /// # Errors

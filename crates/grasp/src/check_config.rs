@@ -31,8 +31,8 @@ impl CheckConfig {
     /// Size range for a camera at the same distance as for the photo, as in the simulated workcell. If the size may
     /// shrink to four fifths, a lever that resembles the pendulum reaches an agreement of 0.66.
     pub const FIXED_HEIGHT_TOLERANCE: RangeInclusive<f64> = 0.97..=1.03;
-    /// Size range in a plan view, where the size is known; it includes look-alikes of another size, which are found and
-    /// then refused because of the size.
+    /// Size range in a plan view, where the size is known. It is wide enough that look-alikes of another size are
+    /// found, and then refused because of the size.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
     /// Default maximum number of detections in one picture. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
@@ -90,7 +90,8 @@ impl Default for CheckConfig {
 pub struct Term {
     /// Log-odds per unit of the value.
     pub weight: f64,
-    /// The neutral value: half-way between the medians of correct and wrong poses.
+    /// The value that contributes nothing; for most fitted terms half-way between the medians of correct and wrong
+    /// poses.
     pub neutral: f64,
     /// The range to which values are clamped, which limits the influence of this evidence.
     pub range: [f64; 2],
@@ -100,9 +101,9 @@ pub struct Term {
 ///
 /// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
 /// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
-/// hue, size and bias were set by hand; with these ranges only table, added and mirror reject a pose alone, regardless
-/// of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing proposal
-/// counts, because a network also proposes look-alikes.
+/// hue, size and bias were set by hand; with these ranges only details, table, added and mirror reject a pose alone,
+/// regardless of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing
+/// proposal counts, because a network also proposes look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {
@@ -209,7 +210,7 @@ impl Default for ScoreConfig {
 }
 
 impl Term {
-    /// The log-odds of a value: its distance from the neutral value, clamped to the range, times the weight.
+    /// The log-odds of a value: the value clamped to the range, minus the neutral value, times the weight.
     pub(crate) fn log_odds(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         self.weight * (value.clamp(low, high) - self.neutral)

@@ -133,7 +133,7 @@ pub enum GraspError {
     /// Invalid input of the network.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
-    /// A preset that needs base weights, without any.
+    /// A preset that needs base weights, in a build without weights for it.
     #[cfg(feature = "teach")]
     #[error(
         "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"

@@ -74,7 +74,8 @@ impl EvidenceKind {
         }
     }
 
-    /// Whether the places of difference are shown also if this evidence supports the part, but less than it could.
+    /// Whether this evidence has places of difference to show. It is then listed also if it supports the part, but less
+    /// than it could.
     pub(crate) fn is_local(self) -> bool {
         !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
     }

@@ -28,8 +28,8 @@
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! This crate deliberately has no files, threads, robot or simulator, and no clock in detection: the same code runs in
-//! a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
+//! This crate deliberately has no files, robot or simulator. Detection has no clock and no threads except rayon's: the
+//! same code runs in a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:
 //!
@@ -132,7 +132,7 @@ pub use teach::{FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, 
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(all(doctest, feature = "teach"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

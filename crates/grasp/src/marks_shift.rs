@@ -5,11 +5,11 @@
 //! ```text
 //! shift = η · (position − centre, in the picture) − the same in the photo        η = height / (distance − height)
 //! ```
-//! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture along that line and,
-//! since no camera points exactly down, also at some distance from it. A shift is accepted if its agreement is clearly
-//! better than that of the outline's pose. Fitted on the tuned sets of datasets/split.toml and
-//! base-weights/physical/split.toml: the marks of 304 of 312 parts lie within 4 % of the diagonal, and those of 268
-//! without a shift (docs/decisions/027-heights-and-slants.md).
+//! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture at the shifts that the
+//! possible η give, which form a line, and, since no camera points exactly down, also beside this line. A shift is
+//! accepted if its agreement is clearly better than that of the outline's pose. Fitted on the tuned sets of
+//! datasets/split.toml and base-weights/physical/split.toml: the marks of 304 of 312 parts lie within 4 % of the
+//! diagonal, and those of 268 without a shift (docs/decisions/027-heights-and-slants.md).
 
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;
@@ -33,7 +33,7 @@ const STEP: f64 = 0.01;
 /// Last step of the search, in diagonals. Chosen to save time.
 const LAST_STEP: f64 = 0.0025;
 /// Penalty per diagonal of shift along the line, in agreement of edges and surface together, in `[0, 2]`. Fitted like
-/// the next two (see above); half and double the values change the count by at most 3.
+/// the next two (see above); half and double the values change the number of 304 parts by at most 3.
 const COST_ALONG: f64 = 3.0;
 /// Penalty per diagonal of shift across the line.
 const COST_ACROSS: f64 = 5.0;

@@ -93,8 +93,8 @@ impl GraspModel {
         self
     }
 
-    /// The model with `num_points` edge points compared at each pose of a whole image's search; taught models use 64.
-    /// The calibration is unchanged.
+    /// The model with `num_points` edge points compared at each pose in the search of a whole image; taught models use
+    /// 64. The calibration is unchanged.
     ///
     /// # Errors
     /// A number of points outside 8 to 1024.
@@ -167,7 +167,7 @@ impl GraspModel {
         Ok(model)
     }
 
-    /// The bounds of a part's size relative to the nominal size that are searched.
+    /// The searched bounds of a part's size relative to the nominal size.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()
     }
@@ -253,7 +253,7 @@ impl GraspModel {
         Ok(level)
     }
 
-    /// Detections in an image at this slant, and the slant suggested by the best matches if `suggest` is set.
+    /// Detections in an image taken as level, and the slant suggested by the best matches if `suggest` is set.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let search = || {
             let searched = SearchedImage::of(image, shot, &self.demonstrations);
@@ -322,15 +322,15 @@ impl GraspModel {
             .collect()
     }
 
-    /// The verdict's inputs for a place.
+    /// The verdict's inputs for a sighting.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
         let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
         Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
     }
 
-    /// The scores of all places in one picture of a sequence in which parts had the given size before, as in
-    /// [`Clues::log_size`].
+    /// The scores of all sightings in one picture of a sequence. `earlier_log_size` is the size of parts in earlier
+    /// pictures, as in [`Clues::log_size`].
     pub(crate) fn judge_in_sequence(
         &self,
         clues: &[Clues],

@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use crate::network_calibration::{NetworkCalibration, log_odds};
 
 /// A score this far below the threshold, in log-odds, does not speak against the part: pictures score lower than
-/// held-out samples by about this much (the correct places of the housing by a median of 3.7, and 5.5;
-/// docs/decisions/013-base-weights.md).
+/// held-out samples by about this much (the correct places of the housing had a median score of 3.7 in pictures and 5.5
+/// in held-out samples; docs/decisions/013-base-weights.md).
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
@@ -72,7 +72,7 @@ mod tests {
         let good = NetworkEvidence::new(&[0.9; 30], &[0.0; 30], &CALIBRATION);
         assert!((good.log_likelihood_ratio(0.95, &CALIBRATION) - 31f64.ln()).abs() < 1e-12);
         assert!((good.log_likelihood_ratio(0.0, &CALIBRATION) + 31f64.ln()).abs() < 1e-12);
-        // Half a log-odds further below the threshold than the margin, and half less.
+        // In log-odds, 0.25 is 2.5 below the threshold and 0.4 is 1.8 below it; the margin lies between.
         assert_eq!(good.log_likelihood_ratio(0.25, &CALIBRATION), 0.0);
         assert!(good.log_likelihood_ratio(0.4, &CALIBRATION) > 3.0);
         let poor = NetworkEvidence::new(&[0.9, 0.25, 0.0], &[0.9, 0.25, 0.0], &CALIBRATION);

@@ -88,7 +88,7 @@ impl Prepared {
     }
 }
 
-/// The most recently used sizes of one demonstration. Each takes milliseconds to prepare, with the same result each
+/// The most recently prepared sizes of one demonstration. Each takes milliseconds to prepare, with the same result each
 /// time.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PreparedSizes {

@@ -3,8 +3,8 @@
 //! The outline of a screw that lies on its side is at the height of the axis; the marks are on the upper side, higher
 //! by the radius at the marks. This height determines their shift in a camera's picture. The surroundings of the marks
 //! differ with the roll about the axis and carry no information. If the part lies in the same roll as in the photo,
-//! edges on its upper side also agree, and the pose lies higher than the outline; its distance from the outline is
-//! measured with the outline alone.
+//! edges on its upper side also agree and shift the pose from the outline towards the marks; how far is measured with
+//! the outline alone.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::PlanarSimilarity;
@@ -66,7 +66,8 @@ mod tests {
         let pose = PlanarSimilarity { tx: 460.0, ty: 90.0, scale: 1.25, ..PlanarSimilarity::IDENTITY };
         let at = pose.apply(&Point2::new(40.0, 10.0));
         let shift = top.shift(600.0, Point2::new(320.0, 240.0), &pose);
-        // 15 px of 600 px, of the distance from the point below the camera.
+        // At this scale the marks are 15 px above the axis, and the camera is 600 px away: the shift is 15/600 of the
+        // distance from the point below the camera.
         let expected = 0.025 * (at - Point2::new(320.0, 240.0));
         assert!((shift - expected).norm() < 1e-9, "{shift}");
     }

@@ -23,8 +23,8 @@ use sdg_shape::PixelRect;
 const MARGIN: f64 = 0.5;
 /// Additional margin in pixels, for the smoothing of the gradients. Chosen by hand.
 const BORDER_PX: f64 = 4.0;
-/// Window corners are at multiples of this many pixels of the halved picture, so that all levels of its pyramid have
-/// the pixels of the whole picture's levels.
+/// Window corners are at multiples of this many pixels of the halved picture. The pyramid levels that are read then
+/// have the same pixels as those of the whole picture.
 const GRID_PX: u32 = 8;
 
 /// Whether a region can be searched, as far as is known without a picture: it has pixels and, if the size of its

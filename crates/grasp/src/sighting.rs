@@ -25,8 +25,8 @@ pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'
     sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
 }
 
-/// All such places in an image: first the network's proposals, then `found`, the matches of the search. A place may
-/// occur twice.
+/// All sightings in an image: first the network's proposals, then `found`, the matches of the search. A place may occur
+/// twice.
 pub(crate) fn sightings<'a>(
     proposals: &Proposals,
     found: &[PlacedDemonstration<'a>],

@@ -22,12 +22,12 @@ const NUM_SLANT_PLACES: usize = 4;
 const MIN_AGREEMENT: f64 = 0.25;
 /// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
-/// Standard deviation of ln shortening relative to that of the slant. Chosen by hand.
+/// Standard deviation of a place's ln shortening about that of the slant. Chosen by hand.
 const SHORTENING_NOISE: f64 = 0.12;
 /// Minimum tilt in radians: a smaller one shortens by less than 3 % and is ignored.
 const MIN_TILT: f64 = 0.24;
-/// Minimum fraction of the shortening, relative to a level camera, that a slant must explain: less is noise of the
-/// fits. Chosen by hand to save time; the agreement of the places decides.
+/// Minimum decrease of the cost by a slant, relative to a level camera: less is noise of the fits. Chosen by hand to
+/// save time; the agreement of the places decides.
 const MIN_EXPLAINED: f64 = 0.1;
 /// Minimum gain of agreement over the level view, of a slanted place and then of the picture. For places seen by a
 /// camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned sets).
@@ -53,7 +53,7 @@ pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
 }
 
 /// A shortened place: the position relative to the picture's centre, the shortening as a vector that a rotation by 180°
-/// does not change, and the fraction of edge points on crests.
+/// does not change, and a weight: the fraction of edge points on crests above the minimum.
 struct Shortened {
     at: Vector2<f64>,
     shortening: Vector2<f64>,
@@ -145,7 +145,7 @@ pub(crate) struct LevelImage {
     slant: Slant,
     /// Width and height of the picture, which may be a window of a larger one.
     size: [u32; 2],
-    /// The shot that a level camera would have taken.
+    /// The shot of the picture, as taken by a level camera.
     taken: Shot,
     /// The position of the centre of the camera's picture, in pixels of the level picture.
     middle: Vector2<f64>,
@@ -192,7 +192,7 @@ impl LevelImage {
         Some(self.taken.below_camera + seen)
     }
 
-    /// Maps a detection of the level picture to the slanted one; `None` if it lies outside.
+    /// Maps a detection of the level picture to the slanted one; `None` if too little of it lies inside.
     pub(crate) fn seen(&self, found: Found) -> Option<Found> {
         let Found { detection, placement } = found;
         let points = |all: &[Point2<f64>]| all.iter().map(|point| self.point(point)).collect::<Option<Vec<_>>>();

@@ -150,11 +150,11 @@ impl TaughtDemonstration {
         self.finer_reference.get_or_init(made)
     }
 
-    /// The demonstration with other settings of comparison and search. Files do not store the settings: a demonstration
-    /// read from a file has the defaults.
+    /// The demonstration with other settings of comparison and search. Of these, a model file stores only the size
+    /// tolerance and the change of the score's bias; the others have their defaults after reading.
     ///
     /// # Errors
-    /// A value out of range.
+    /// A value out of range, or a cut-out without a shape to compare in the outline.
     pub fn with_check(self, check: CheckConfig) -> Result<Self, GraspError> {
         Self::with_config(self.cutout, self.marks, check)
     }

@@ -10,9 +10,9 @@
 //! ```
 //! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
 //! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
-//! other evidence supports is accepted. Only three contradictions reject it alone: bare table where the part should be,
-//! more edges than the part has, and a better fit of its mirror image. The weights come from a logistic regression on
-//! generated parts ([`crate::fitting`]).
+//! other evidence supports is accepted. Only these contradictions reject it alone: bare table where the part should be,
+//! more edges than the part has, a better fit of its mirror image, clearly different details and, if the size is known,
+//! another size. The weights come from a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -156,7 +156,8 @@ pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, 
     clues.iter().map(|clues| judge(clues, reference, config)).collect()
 }
 
-/// As [`judge_picture`], for a picture of a sequence in which parts had a size before, as [`Clues::log_size`].
+/// As [`judge_picture`], for a picture of a sequence; `earlier_log_size` is the size of parts in earlier pictures, as
+/// [`Clues::log_size`].
 pub(crate) fn judge_picture_of_sequence(
     clues: &[Clues],
     earlier_log_size: Option<f64>,
@@ -197,8 +198,8 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
 }
 
-/// The difference by which the rival fits better, weighted by how well it fits at all (in other light, or rolled, a
-/// part fits neither); 0 if photo and rival differ too little.
+/// The difference by which the rival fits better, weighted by how well the rival fits at all, because a part in other
+/// light or in another roll fits neither photo nor rival; 0 if photo and rival differ too little.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
     /// Below the first value of its fit, the rival gets no weight, above the second the full weight. Chosen on the
     /// tuned sets and parts.

@@ -169,7 +169,8 @@ impl PlacedDemonstration<'_> {
 /// Distance from an end of the size range, in ln, within which the end may have stopped the refinement of a pose.
 /// Chosen by hand.
 const END_MARGIN_LOG: f64 = 0.02;
-/// Gain of agreement beyond the end that shows this. Chosen by hand.
+/// Minimum gain of agreement beyond an end of the size range that shows that the end stopped the refinement. Chosen by
+/// hand.
 const MIN_GAIN_BEYOND_END: f64 = 0.05;
 /// Minimum agreement for a search of the marks; poses below it are refused. Chosen by hand to save time.
 const MIN_MARKED: f64 = 0.3;
@@ -315,8 +316,8 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
-/// The shortening of a placed demonstration, and its direction in the image; `None` if the size is outside the search
-/// range.
+/// The shortening of a placed demonstration, and its direction in the image; `None` as for
+/// [`ShapeTemplate::foreshortening`](sdg_shape::ShapeTemplate::foreshortening).
 pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
@@ -324,8 +325,8 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
-/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if its
-/// size is outside the search range.
+/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if a point
+/// of the outline has no position in the window.
 pub(crate) fn agreement_in(
     searched: &SearchedImage<'_>,
     placed: &PlacedDemonstration<'_>,
@@ -346,8 +347,8 @@ pub(crate) fn agreement_in(
     Some(comparison.agreement(&comparison.refined_by_edges(&pose)).both())
 }
 
-/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` if its size is outside the search
-/// range.
+/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` if the demonstration is not
+/// searched at any size.
 pub(crate) fn differences(
     searched: &SearchedImage<'_>,
     demonstration_idx: usize,

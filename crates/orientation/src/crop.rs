@@ -20,7 +20,7 @@ const SIDE_PER_DIAGONAL: f64 = 1.1;
 /// Colour of a crop beyond the image: the mean colour of photos, which is zero in the network's input.
 pub const OUTSIDE: [u8; 3] = [124, 116, 104];
 
-/// Maximum number of samples averaged for one pixel of a crop, along each axis: a reduction of eight.
+/// Maximum number of samples averaged for one pixel of a crop, along each axis: enough for an eightfold reduction.
 const MAX_TAPS: usize = 8;
 
 /// A square of an image, possibly rotated: the area of a crop.

@@ -1,6 +1,6 @@
 //! Prints the errors of refinement and the agreement of right and wrong poses on synthetic scenes.
 //!
-//! `cargo run --release -p sdg-shape --example separation -- [scenes per part] [folder for pictures]`
+//! `cargo run --release -p sdg-shape --example separation -- [scenes per part] [tilt of the light] [folder]`
 
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;

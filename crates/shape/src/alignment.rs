@@ -1,8 +1,10 @@
-//! How well the directions of a template's edge points agree with those of a picture, computed many times at each pose.
+//! The agreement of the directions of a template's edge points with those of a picture at a pose, computed for several
+//! points at once.
 //!
-//! Legend: with `s` the picture's direction at a point, `d` the point's own, both at twice their angle, and `R` the pose's turn, also
-//! twice, a point's share of the sum is `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)`; both products are added up over all
-//! points, and the turn is applied once.
+//! Legend: with `s` the picture's direction at a point, `d` the point's own, both at twice their angle, and `R` the
+//! rotation by twice the pose's angle, a point's share of the sum is
+//! `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)`; both products are added up over all points, and the
+//! rotation is applied once.
 
 use pulp::{Simd, WithSimd};
 use wide::f32x4;

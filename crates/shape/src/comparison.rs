@@ -7,11 +7,12 @@
 //!                     └─ still poor: climbed from six poses around it ─ refined by edges, kept where both still agree
 //! ```
 //! The edges alone place a part to a fraction of a pixel, but may match the wrong edges: a pipe is shifted along itself
-//! until one flank lies on its shadow. There both agreements are low, but refinement by edges uses neither. Such poses
-//! are therefore refined by edges and surface together, from the result and from the start. On 480 pictures of eight
-//! parts, from starts some pixels off, 25 of 960 ended beside the part and 60 had an error above 3 px; now 0 and 7. The
-//! first percentile of the agreement of right poses was 0.32 to 0.59 by part; now 0.49 to 0.62. The highest agreement
-//! of a wrong pose rose from 0.48 to 0.56.
+//! until one flank lies on its shadow. There both agreements are low, but refinement by edges decides by the consensus
+//! of crests. Such poses are therefore refined by edges and surface together, from the result and from the start. On
+//! 480 pictures of eight parts, 960 refinements were started some pixels off: by edges alone, 25 ended beside the part
+//! and 60 had an error above 3 px; with the further refinement, 0 and 7. The first percentile of the agreement of right
+//! poses, which differs by part, was 0.32 to 0.59 and is now 0.49 to 0.62. The highest agreement of a wrong pose rose
+//! from 0.48 to 0.56.
 
 use std::ops::RangeInclusive;
 
@@ -43,7 +44,7 @@ const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
 /// A pose of lower agreement is refused without a close look. Chosen by hand to save time.
 const MIN_CLOSE_LOOK_AGREEMENT: f64 = 0.3;
-/// A pose of lower agreement is not tried at other turns. Chosen by hand to save time.
+/// A pose of lower agreement is not tried at other angles. Chosen by hand to save time.
 const MIN_TURN_AGREEMENT: f64 = 0.45;
 /// Poses of lower agreement are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;
@@ -57,7 +58,7 @@ pub struct Comparison<'a> {
     pub surface: &'a Surface,
     /// Its edges over the whole area, compared in both directions.
     pub structure: &'a Structure,
-    /// The input of the comparing network.
+    /// The input of the likeness network.
     pub likeness: &'a Likeness,
     /// Its features, for the details network.
     pub details: &'a Details,
@@ -65,7 +66,7 @@ pub struct Comparison<'a> {
     pub(crate) mirrored: Option<&'a Rival>,
     pub(crate) turned: Option<&'a Rival>,
     pub(crate) profile: Option<&'a Profile>,
-    /// Poses of lower agreement are not given to that network.
+    /// Poses of lower agreement get no close look.
     pub min_agreement: f64,
     /// The image over which the demonstration is laid.
     pub picture: Picture<'a>,
@@ -120,7 +121,7 @@ pub struct Evidence {
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
-    /// `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`].
+    /// `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`], or by less than 0.3.
     pub close: Option<CloseLook>,
 }
 
@@ -154,8 +155,9 @@ impl Comparison<'_> {
         Evidence { close, ..evidence }
     }
 
-    /// `pose`, or another turn at which the part resembles itself if the distinguishing features favour it. For a part
-    /// of revolution, its position along the axis and its end, as found from the profile. Scales stay in `scales`.
+    /// `pose`, or the pose of another rotation at which the part resembles itself, if the distinguishing features
+    /// favour that. For a part of revolution, `pose` with the position along the axis and the direction of the axis
+    /// found from the profile. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
         if self.agreement(pose).both() < MIN_TURN_AGREEMENT {
             return *pose;
@@ -227,13 +229,13 @@ impl Comparison<'_> {
         )
     }
 
-    /// Refined by the edges alone: fast, and exact where it is right.
+    /// The pose refined by the edges alone: fast, and exact if it follows the right edges.
     pub fn refined_by_edges(&self, start: &PlanarSimilarity) -> PlanarSimilarity {
         self.template.refine(self.picture.field, start).image_from_demonstration
     }
 
-    /// `refined` (from `start` by edges), or a nearby pose of higher agreement if its agreement is poor. Scales stay in
-    /// `scales`.
+    /// `refined` (from `start` by edges), or a nearby pose of higher agreement if the agreement of `refined` is poor.
+    /// Scales stay in `scales`.
     pub fn refine_pose(
         &self,
         start: &PlanarSimilarity,
@@ -260,7 +262,7 @@ impl Comparison<'_> {
         if scales.contains(&last.scale) && both(&last) >= agreement - MAX_LOSS_BY_EDGES { last } else { best }
     }
 
-    /// The pose shifted in six directions; chosen by hand, more cost proportionally more time.
+    /// The pose shifted in six directions; chosen by hand, more shifts take proportionally more time.
     fn all_around(&self, pose: &PlanarSimilarity) -> [PlanarSimilarity; 6] {
         let center = pose.apply(&self.template.center);
         std::array::from_fn(|i| {
@@ -285,7 +287,7 @@ impl Comparison<'_> {
         search.climb(from, neighbour, |pose| self.agreement(pose).both())
     }
 
-    /// Moves along x or y, turns or scales, so that edges move by about `step_px` pixels of the image.
+    /// Moves along x or y, rotates or scales, so that edges move by about `step_px` pixels of the image.
     fn stepped(&self, pose: &PlanarSimilarity, direction: usize, step_px: f64) -> PlanarSimilarity {
         let center = pose.apply(&self.template.center);
         let turn = step_px / (self.template.radius_px() * pose.scale).max(1.0);

@@ -85,8 +85,8 @@ pub struct GradientConfig {
     /// Gradient below which a direction is ignored even in a noiseless image, in grey levels per level pixel. A step of
     /// 5 grey levels has about this gradient after smoothing. Derived from that, not measured.
     pub min_gradient: f32,
-    /// An edge's energy must exceed this many times that of the quiet quarter of the pixels, from which the noise is
-    /// estimated. Chosen by hand, not measured.
+    /// An edge's energy must exceed `min_gradient`² plus this many times the lower quartile of the pixels' energies, an
+    /// estimate of the noise. Chosen by hand, not measured.
     pub noise_factor: f32,
 }
 
@@ -160,9 +160,9 @@ impl Default for StructureConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct AgreementConfig {
-    /// Extent of the part at which its edges are compared, in level pixels. It is coarser than the finest level, so
-    /// that a pixel of parallax or of lens distortion does not count as another shape. Derived from that; no
-    /// measurement is recorded.
+    /// Extent of the part, in level pixels, at the pyramid level where its edges are compared. This level is coarser
+    /// than the finest, so that a pixel of parallax or of lens distortion does not count as another shape. Derived from
+    /// that; no measurement is recorded.
     pub extent: f64,
     /// The weight of the surface in the average with the edges, which have the remaining weight. Fitted on the
     /// simulator's pictures: weights of 7 : 2 : 1 for edges, cells and whole surface left 30 of 950 right poses below
@@ -191,7 +191,7 @@ impl Default for AgreementConfig {
 pub struct RefinementConfig {
     /// A pose of at least this agreement is not refined again.
     pub sure_agreement: f64,
-    /// Distance in pixels of further climbs from a pose whose agreement stays poor.
+    /// Distance in pixels between a pose whose agreement stays poor and the starts of further climbs.
     pub restart_px: f64,
     /// Minimum agreement for further climbs: no pose below it was the part.
     pub min_restart_agreement: f64,

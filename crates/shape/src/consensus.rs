@@ -19,9 +19,11 @@ use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, Group, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, TemplateLevel};
 
-/// Width of "on the edge" in level pixels, from the first round to the last. Chosen by hand, not measured.
+/// Widths of the kernel that decides whether a crest counts, in level pixels, from the first fit to the last. Chosen by
+/// hand, not measured.
 pub(crate) const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
-/// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
+/// Distance of the starts of the first round from the pose, in level pixels of edge movement by shift and by scale.
+/// Chosen by hand, not measured.
 const START_STEP: f64 = 3.0;
 /// Maximum rounds of gathering crests, and the movement (level pixels) below which they stop. Both limit
 /// the time; chosen by hand, not measured.
@@ -96,7 +98,7 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach:
     Sightings::gather(matched.image_level, &places, reach)
 }
 
-/// The step of highest consensus from any of the starts; starts that reach the same place are merged.
+/// The step of highest consensus from any of the starts; starts that converge to the same step are merged.
 fn best_fit(sightings: &Sightings<4>, is_free: [bool; 4], mut steps: Vec<Vector4<f64>>) -> (Vector4<f64>, f64) {
     for width in &WIDTHS {
         let mut fitted: Vec<Vector4<f64>> = Vec::with_capacity(steps.len());
@@ -135,7 +137,7 @@ fn kernel(x: f32) -> f32 {
     rest * rest
 }
 
-/// Residual and weighted consensus share of the crest of each point that fits a step best.
+/// For each point, the residual and the weighted consensus share of its crest that fits a step best.
 #[inline(always)]
 fn best_crests<const N: usize>(group: &Group<N>, step: &[f32; N], width: f32) -> ([f32; LANES], [f32; LANES]) {
     let (mut rests, mut shares) = ([0.0f32; LANES], [0.0f32; LANES]);
@@ -203,7 +205,7 @@ struct Consensus<'a, const N: usize> {
 impl<const N: usize> WithSimd for Consensus<'_, N> {
     type Output = f32;
 
-    /// As there.
+    /// As in [`NormalEquations`].
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> f32 {
         let mut sums = [0.0f32; LANES];

@@ -13,11 +13,11 @@ const STRENGTH_OVER_FLOOR: f32 = 1.5;
 const STRENGTH_OVER_STRONG: f32 = 0.08;
 /// Minimum share of energy in one direction; below it the point is a corner or texture. Chosen by hand, not measured.
 const MIN_COHERENCE: f32 = 0.5;
-/// |cos 2φ| between an edge's normal and the outline's beyond which the edge is the outline's own: up to 30° between
-/// them. Chosen by hand, not measured.
+/// cos 2φ, with the angle φ between an edge's normal and the outline's, above which the edge is the outline's own: up
+/// to 30°. Chosen by hand, not measured.
 const OUTLINE_ALIGNMENT: f64 = 0.5;
-/// Rounds of the re-weighting that balances the directions of the pose, and its largest factor. Chosen by hand, not
-/// measured.
+/// Rounds of the re-weighting that balances the directions of the pose, and its smallest and largest factor. Chosen by
+/// hand, not measured.
 const BALANCE_ROUNDS: usize = 3;
 const BALANCE_LIMITS: (f64, f64) = (0.4, 4.0);
 
@@ -84,7 +84,7 @@ pub(crate) fn select_edge_points(
     points
 }
 
-/// Edge pixels on the crest of the gradient, moved onto the crest, inside the outline or on it.
+/// Crests of the gradient, to a fraction of a pixel, inside the outline or on it.
 fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelection<'_>) -> Vec<EdgeCandidate> {
     // An outline drawn by hand or cut from a mask has an error of about 1.5 pixels at any level: estimated, not
     // measured.
@@ -184,8 +184,8 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
                 kept.push(idx);
             }
         }
-        // A full set may lack weak regions that the next larger distance would reach; it never has far fewer points
-        // than requested. The shares trade time for an even spread; chosen by hand.
+        // Nine tenths of the requested points are enough: a smaller distance would give more points, but fewer in weak
+        // regions. Both shares trade time for an even spread; chosen by hand.
         if kept.len() >= max_points * 9 / 10 || distance < 0.5 * pixel_size {
             return kept;
         }

@@ -1,6 +1,6 @@
-//! Errors of making a template.
+//! Errors of templates, configurations and weights.
 
-/// Why a [`crate::ShapeTemplate`] could not be made.
+/// Why a template could not be made, or why a configuration or weights cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -8,7 +8,7 @@ pub enum ShapeError {
     /// The outline is not an area: too few vertices, or a coordinate that is not a number.
     #[error("expected an outline of at least 3 finite vertices, found {found}")]
     OutlineDegenerate {
-        /// The content of the outline.
+        /// The number of vertices, or the vertex that is not finite.
         found: String,
     },
     /// The outline and the image overlap too little.
@@ -31,7 +31,7 @@ pub enum ShapeError {
          surroundings; photograph it on a plain background of another brightness, or correct its marks"
     )]
     TooFewEdges { expected: usize, found: usize },
-    /// A file of weights does not contain those of the network that compares photo and picture.
+    /// A file does not contain the weights of the network that reads it.
     #[error("weights of the comparing network: {0}")]
     Weights(String),
     /// A configuration value lies outside its range.

@@ -20,7 +20,7 @@ use crate::template::ShapeTemplate;
 pub struct Reach {
     /// In x and in y, in pixels of the image.
     pub shift_px: f64,
-    /// Turn in either direction, in radians.
+    /// Rotation in either direction, in radians.
     pub turn_rad: f64,
     /// Change of ln scale in either direction; 0 keeps the scale.
     pub log_scale: f64,
@@ -34,7 +34,7 @@ impl Reach {
 
 impl ShapeTemplate {
     /// Image pixels per pixel of the coarsest level of refinement, for a part `scale` times as large as in the
-    /// demonstration. An image window whose corner is at multiples of it has the same pyramid as the image.
+    /// demonstration. An image window whose corner is at multiples of this value has the same pyramid as the image.
     pub fn coarsest_pixel(&self, scale: f64) -> u32 {
         let pixel_size = self.levels[self.levels.len() - 1].pixel_size * scale;
         1 << pixel_size.max(1.0).log2().round() as u32
@@ -86,7 +86,7 @@ impl ShapeTemplate {
     /// [`Self::snapped`]. Deterministic.
     ///
     /// # Units and frames
-    /// As there.
+    /// As for [`Self::snapped`].
     pub fn captured(&self, field: &GradientField, start: &PlanarSimilarity, reach: &Reach) -> PlanarSimilarity {
         let start = Pose::from_similarity(start, self.center);
         self.follow(field, &reach.about(start), start).to_similarity(self.center)
@@ -101,7 +101,8 @@ mod tests {
     use nalgebra::Point2;
     use sdg_geometry::{Angle, BoundingBox, Polygon};
 
-    /// A dark plate of 100 × 60 pixels with a bright hole off its middle, turned about its middle and moved there.
+    /// A dark plate of 100 × 60 pixels with a bright hole off its middle, turned about its middle, which lies at
+    /// `middle`.
     fn plate(angle_deg: f64, middle: Point2<f64>) -> RgbImage {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         RgbImage::from_fn(240, 200, |x, y| {

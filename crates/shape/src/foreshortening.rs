@@ -1,7 +1,7 @@
 //! Foreshortening of a part compared with the photo, from the slant of an uncalibrated camera.
 //!
 //! A camera tilted by t from the vertical shows a flat part shortened by cos t in one direction of the image. Starting
-//! from a pose of turn, shift and scale, the part's edge points are followed to an affine map of six coordinates, by
+//! from a pose (angle, shift and scale), the part's edge points are followed to an affine map of six coordinates, by
 //! the same consensus of crests as [`crate::consensus`].
 
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
@@ -15,17 +15,17 @@ use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 
-/// Starts: no shortening, and this shortening (ln) in each of this many directions. A start is followed over about half
-/// of that.
+/// Starts: no shortening, and each of these shortenings (ln of the ratio of lengths) in each of `NUM_DIRECTIONS`
+/// directions. The fit from a start moves by about half of a shortening.
 const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
 const NUM_DIRECTIONS: usize = 6;
 /// Rounds of gathering crests anew. Chosen by hand to save time.
 const ROUNDS: usize = 3;
-/// Maximum tilt of a part on a table: 50°. Derived.
+/// ln of the shortening at the maximum tilt of a part on a table: 50°. Derived.
 const MAX_LOG_RATIO: f64 = 0.45;
 
-/// Largest edge movement by a shortening, as shift in x and in y (px), turn (rad) and ln scale. Chosen by hand, larger
-/// than any observed.
+/// Largest edge movement by a shortening, as shift in x and in y (px), rotation (rad) and ln scale. Chosen by hand,
+/// larger than any observed.
 const READ_WITHIN: [f64; 4] = [24.0, 24.0, 0.0, 0.5];
 
 /// The shortening of a part at a pose.
@@ -35,9 +35,9 @@ pub struct Foreshortening {
     pub log_ratio: f64,
     /// The direction of the image in which the part is shortened; its sign has no meaning.
     pub direction: Angle,
-    /// The share of edge points on a crest of the image, in `[0, 1]`, and that of the pose without shortening.
+    /// The share of edge points on a crest of the image, in `[0, 1]`.
     pub consensus: f64,
-    /// See [`Self::consensus`].
+    /// The same at the pose without shortening.
     pub level_consensus: f64,
 }
 
@@ -49,7 +49,8 @@ struct Affine {
 }
 
 impl ShapeTemplate {
-    /// The shortening of the part at about this pose; `None` where no edge is near.
+    /// The shortening of the part near this pose; `None` for an impossible pose, or if the part is shortened more than
+    /// at the maximum tilt.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.
@@ -86,7 +87,7 @@ impl ShapeTemplate {
     }
 }
 
-/// Maps of the image that shorten it in one direction and keep its area.
+/// The identity, and maps of the image that shorten it in one direction and keep its area.
 fn starts() -> impl Iterator<Item = Matrix2<f64>> {
     let shortened = START_LOG_RATIOS.into_iter().flat_map(|log_ratio| {
         (0..NUM_DIRECTIONS).map(move |k| {
@@ -105,7 +106,7 @@ fn consensus(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine) -
     Some(consensus_at(&sightings, &SVector::zeros()))
 }
 
-/// Moved onto the crests nearby; the pose and its consensus.
+/// Moves a pose onto the crests nearby; returns the pose and its consensus.
 fn follow(level: &TemplateLevel, matched: &MatchedLevel<'_>, mut pose: Affine) -> Option<(Affine, f64)> {
     let pixel = matched.image_pixel_size;
     let mut score = 0.0;
@@ -122,7 +123,7 @@ fn follow(level: &TemplateLevel, matched: &MatchedLevel<'_>, mut pose: Affine) -
     Some((pose, score))
 }
 
-/// The template's size in level pixels.
+/// The template's radius at a pose, in level pixels.
 fn radius(level: &TemplateLevel, image_pixel_size: f64, pose: &Affine) -> f64 {
     (level.radius_px * pose.linear.determinant().abs().sqrt() / image_pixel_size).max(1.0)
 }

@@ -20,7 +20,8 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// A square with the part, whose bounds are in pixels of the cut-out, `part_side` pixels long.
+    /// A square in which the longer side of the part is `part_side` pixels long; `bounds` are the part's, in pixels of
+    /// the cut-out.
     pub(crate) fn about(bounds: &BoundingBox, part_side: f64, side: usize) -> Self {
         Self { step: bounds.width().max(bounds.height()) / part_side, center: bounds.center(), side }
     }
@@ -30,12 +31,12 @@ impl Frame {
         self.step
     }
 
-    /// The place of a point of the square in the cut-out.
+    /// The position in the cut-out of a point of the square.
     pub(crate) fn place(&self, at: [f64; 2]) -> Point2<f64> {
         self.center + self.step * Vector2::from(at.map(|coordinate| coordinate - 0.5 * self.side as f64))
     }
 
-    /// The place of a point of the cut-out in the square.
+    /// The position in the square of a point of the cut-out.
     pub(crate) fn place_of(&self, point: &Point2<f64>) -> [f64; 2] {
         let from_center = (point - self.center) / self.step;
         [from_center.x, from_center.y].map(|coordinate| coordinate + 0.5 * self.side as f64)
@@ -53,7 +54,7 @@ impl Frame {
         self.sampled_by(image, image_from_cutout, (self.step * image_from_cutout.scale).ceil())
     }
 
-    /// The same with fewer samples, so that few pixels are skipped.
+    /// The same with fewer samples, so that some pixels may be skipped.
     pub(crate) fn sampled_sparsely(
         &self,
         image: &RgbImage,

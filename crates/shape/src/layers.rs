@@ -20,7 +20,7 @@ pub(crate) const fn layer(inputs: usize, outputs: usize, stride: usize) -> Layer
     Layer { inputs, outputs, stride }
 }
 
-/// Weights by input, then by output; and the bias.
+/// Weights by tap, input and output; and the bias.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     pub(crate) weights: Vec<f32>,
@@ -85,7 +85,7 @@ pub(crate) fn convolved<const OUTPUTS: usize>(
     for (y, row) in out.chunks_exact_mut(out_side * OUTPUTS).enumerate() {
         for (block, out) in row.chunks_mut(PIXELS * OUTPUTS).enumerate() {
             let at = |tap: usize, pixel: usize| {
-                // Of a block beyond the row's end only the pixels of the row are kept.
+                // Pixels of a block beyond the row's end are not kept.
                 let x = (block * PIXELS + pixel).min(out_side - 1);
                 padded.pixel(x * layer.stride + tap % 3, y * layer.stride + tap / 3)
             };
@@ -101,7 +101,7 @@ pub(crate) fn convolved<const OUTPUTS: usize>(
     out
 }
 
-/// Some channels of a block of pixels.
+/// Computes `COUNT` channels of a block of pixels.
 #[inline(always)]
 fn sum_block<'a, const COUNT: usize, const OUTPUTS: usize>(
     convolution: &Linear,

@@ -1,9 +1,9 @@
 //! The demonstration laid over an image: whether the part is there, and its pose to a fraction of a pixel.
 //!
-//! A detector taught from one photo also gives detections on other parts, and its poses have errors of some
-//! pixels. Laying the demonstration over the image decides both. The part's edges are read from the
-//! demonstration once; at a predicted pose their directions are compared with the directions of the image's
-//! gradients (sign ignored, since the background changes), and the pose climbs from there in x, y, angle and
+//! A detector taught from one photo also gives detections on other parts, and its poses have errors of some pixels.
+//! Laying the demonstration over the image decides whether it is the part, and corrects the pose. The part's edges are
+//! read from the demonstration once; at a predicted pose their directions are compared with the directions of the
+//! image's gradients (sign ignored, since the background changes), and the pose climbs from there in x, y, angle and
 //! scale.
 //!
 //! ```text
@@ -12,10 +12,10 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area in both
-//! directions; a [`Comparison`] scores edges and surface together and collects the [`Evidence`] for a pose.
-//! [`ShapeSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
-//! best. [`ShapeConfig`] holds the fitted values, with their origin.
+//! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area in both directions;
+//! a [`Comparison`] scores edges and surface together and collects the [`Evidence`] for a pose. [`ShapeSearch`] needs
+//! no detector: it coarsely tries every position, angle and scale in a whole image and refines the best.
+//! [`ShapeConfig`] holds the fitted values, with their origin.
 //!
 //! # Legend
 //!
@@ -34,8 +34,8 @@
 //! | likeness | log-odds of a small network that photo and picture show the same part |
 //! | details | log-odds of a second one, trained on parts and their look-alikes |
 //!
-//! This crate knows no grasp and no camera. Parts lie flat: poses are turns, shifts and scales in the image plane. It
-//! uses threads only with the feature `parallel`, and results do not depend on them.
+//! This crate knows no grasp and no camera. Parts lie flat: poses are rotations, shifts and scales in the image plane.
+//! It uses threads only with the feature `parallel`, and results do not depend on them.
 //!
 //! # Example
 //!
@@ -121,7 +121,7 @@ pub use structure::{Structure, StructureAgreement};
 pub use surface::Surface;
 pub use template::ShapeTemplate;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

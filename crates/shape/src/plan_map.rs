@@ -10,8 +10,8 @@ use crate::lanes::in_lanes;
 use crate::parallel;
 use crate::pixel_cell::PixelReader;
 
-/// Distance in plan-view pixels of two places whose position in the picture is computed; positions between them are
-/// interpolated. At a tilt of 25° with a wide lens the error is below a fiftieth of a pixel (tested).
+/// Distance in plan-view pixels between neighbouring nodes, whose positions in the picture are computed; positions
+/// between nodes are interpolated. At a tilt of 25° with a wide lens the error is below a fiftieth of a pixel (tested).
 const CELL: u32 = 8;
 /// Maximum samples of the picture per side for a pixel of the plan view.
 const MAX_SAMPLES: usize = 8;
@@ -77,8 +77,8 @@ impl PlanMap {
         RgbImage::from_raw(window.width, window.height, rows.concat()).unwrap_or_default()
     }
 
-    /// The picture positions of both ends of a line across a column of cells, `down` of a pixel below the top of row
-    /// `y`; `None` where the lens shows nothing.
+    /// The picture positions of both ends of a line across a column of cells, `down` pixels below the top of row `y`;
+    /// `None` where the lens shows nothing.
     fn cell_line(&self, column: u32, y: u32, down: f64) -> Option<[Vector2<f64>; 2]> {
         let below = (f64::from(y % CELL) + down) / f64::from(CELL);
         let at = (y / CELL) as usize * self.columns + column as usize;

@@ -1,10 +1,9 @@
-//! A pose of the template during refinement, about the part's centre, where turning and scaling do
-//! not shift it.
+//! A pose of the template during refinement, given about the part's centre, which rotation and scaling do not move.
 
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-/// The position of the part's centre in the image, its turn and its scale.
+/// The position of the part's centre in the image, the part's angle and its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     /// In image pixels.
@@ -85,18 +84,18 @@ impl LevelMap {
         ]
     }
 
-    /// (cos, sin) of twice the turn.
+    /// (cos, sin) of twice the angle.
     pub(crate) fn double_turn(&self) -> [f32; 2] {
         self.double_turn
     }
 
-    /// Turns a direction.
+    /// Rotates a direction.
     #[inline]
     pub(crate) fn turn(&self, v: [f32; 2]) -> [f32; 2] {
         turned(v, self.turn)
     }
 
-    /// Turns a direction given at twice its angle.
+    /// Rotates a direction given at twice its angle.
     #[inline]
     pub(crate) fn turn_double(&self, v: [f32; 2]) -> [f32; 2] {
         turned(v, self.double_turn)

@@ -15,14 +15,14 @@ use crate::gradient_field::GradientField;
 use crate::revolution::Revolution;
 use crate::template::ShapeTemplate;
 
-/// Shifts along the axis at which the profile is compared with the picture, in part lengths: more than a thread's pitch
-/// in both directions.
+/// Number of shifts along the axis in each direction at which the profile is compared with the picture, and their step
+/// in part lengths. Together they exceed a thread's pitch.
 const NUM_SHIFTS: i32 = 4;
 const SHIFT: f64 = 0.03;
-/// Largest further movement, and minimum gain of agreement.
+/// Largest movement of a pose from its shifted start, and minimum gain of agreement.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
 const MIN_GAIN: f64 = 0.05;
-/// Number of steps into which a shift is divided. Chosen by hand: the largest are of nine pixels.
+/// Number of steps into which a shift is divided. Chosen by hand: the largest shifts are of nine pixels.
 const SHARES: usize = 8;
 
 /// The edges along the outline of a part of revolution.
@@ -165,7 +165,7 @@ mod tests {
             let found = profile.share_of(&field, &pose, shift);
             assert!((found - share).abs() < 0.08, "{share}: {found}");
         }
-        // A movement away from the outline and back has no share.
+        // If the shift leads away from the outline, the share is 0.
         assert_eq!(profile.share_of(&field, &PlanarSimilarity::IDENTITY.shifted(shift), shift), 0.0);
     }
 

@@ -27,8 +27,8 @@ const NUM_CANDIDATES: usize = 5;
 /// Step of the grid of poses, in level pixels of edge movement: directions are constant within two
 /// pixels of an edge. Derived from that, not measured.
 const GRID_STEP: f64 = 1.5;
-/// Penalty of agreement for a start at the border of the capture range, so that the prediction wins ties.
-/// Chosen by hand, not measured.
+/// Penalty of agreement for a pose at all limits of the capture range, so that the prediction wins ties. Chosen by
+/// hand, not measured.
 const DISTANCE_PENALTY: f64 = 0.03;
 /// The climb: steps in level pixels of edge movement, and the maximum number of steps. Chosen by hand, not measured.
 const CLIMB: CompassSearch =
@@ -105,12 +105,12 @@ impl ShapeTemplate {
         self.follow_finely(field, range, rough)
     }
 
-    /// The same down to the agreement's level.
+    /// As [`Self::follow`], down to the agreement's level.
     pub(crate) fn follow_roughly(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
         follow_in(&self.levels[self.agreement_level_idx..], field, range, from)
     }
 
-    /// The same from there on, for a pose that was followed roughly.
+    /// As [`Self::follow`] at the levels finer than the agreement's, for a pose that was followed roughly.
     pub(crate) fn follow_finely(&self, field: &GradientField, range: &CaptureRange, rough: Pose) -> Pose {
         follow_in(&self.levels[..self.agreement_level_idx], field, range, rough)
     }

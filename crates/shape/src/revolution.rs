@@ -16,14 +16,14 @@ const MIN_SLENDERNESS: f64 = 2.5;
 const MIN_EXPLAINED: f64 = 0.28;
 /// Minimum change of the light across the axis, as a standard deviation over the mean. Chosen by hand.
 const MIN_CHANGE: f64 = 0.06;
-/// Search range of the axis about the main axis of the outline, in degrees and in shares of the greatest width. Chosen
-/// by hand.
+/// Search range of the axis about the main axis of the outline: number of steps in each direction, and step in degrees
+/// or in shares of the greatest width. Chosen by hand.
 const TURNS: (i32, f64) = (12, 0.5);
 const OFFSETS: (i32, f64) = (6, 0.005);
 /// Number of pixels used to find the axis. Chosen to save time.
 const AXIS_PIXELS: usize = 1000;
-/// Sections along the axis and across it in which the light is averaged; those nearest to the outline show the
-/// background.
+/// Number of sections along the axis and across it in which the light is averaged, and the share of the radius that is
+/// used: pixels nearest to the outline show the background.
 const ALONG: usize = 40;
 const ACROSS: usize = 8;
 const INNER: f64 = 0.8;
@@ -31,12 +31,12 @@ const INNER: f64 = 0.8;
 /// 1.9, the wings of a wing bolt 2.9.
 const MAX_RADIUS_OVER_MEAN: f64 = 2.3;
 
-/// The axis of such a part, as its photo shows it.
+/// The axis of a part of revolution, as its photo shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Revolution {
     on_axis: Point2<f64>,
     axis: Vector2<f64>,
-    /// Pixels of the part: from the first along the axis, and from the axis.
+    /// Pixels of the part: position along the axis from `on_axis`, and signed distance from the axis.
     pixels: Vec<[f64; 2]>,
 }
 
@@ -58,7 +58,7 @@ impl Revolution {
             .filter(|&(x, y)| mask.get(x, y))
             .map(|(x, y)| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
             .collect();
-        // Spread over the part by a stride that does not coincide with the rows.
+        // An odd stride, which rarely coincides with the rows, spreads the pixels over the part.
         let few: Vec<Point2<f64>> = pixels.iter().step_by((pixels.len() / AXIS_PIXELS).max(1) | 1).copied().collect();
         let (on_axis, axis) = axis_of_symmetry(&mask, &few)?;
         let pixels_by_axis: Vec<[f64; 2]> = pixels.iter().map(|at| by_axis(at, &on_axis, &axis)).collect();
@@ -82,8 +82,8 @@ impl Revolution {
         along.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), at| (first.min(at), last.max(at)))
     }
 
-    /// Height of the part's upper side above the axis, beside a line: equal to the distance of the outline from the
-    /// axis there.
+    /// Height in pixels of the part's upper side above the axis, beside a line: equal to the distance of the outline
+    /// from the axis there.
     pub fn radius_beside(&self, line: &GraspLine) -> f64 {
         let ends = [line.start, line.end].map(|end| by_axis(&end, &self.on_axis, &self.axis)[0]);
         let (first, last) = (ends[0].min(ends[1]) - 1.0, ends[0].max(ends[1]) + 1.0);
@@ -111,7 +111,7 @@ impl Revolution {
             .iter()
             .map(|piece| {
                 let radius = radius(piece);
-                // Keeps dark parts from being only noise.
+                // Limits the noise of dark parts.
                 const DARK: f64 = 8.0;
                 let mean_light = piece.iter().map(|(_, light)| light).sum::<f64>() / piece.len() as f64 + DARK;
                 let mut sums = [(0.0, 0.0); ACROSS];
@@ -145,7 +145,7 @@ impl Revolution {
     }
 }
 
-/// A pixel's position along the axis and its distance from it, to the left of the axis's direction.
+/// A pixel's position along the axis from `on_axis`, and its signed distance from the axis.
 fn by_axis(at: &Point2<f64>, on_axis: &Point2<f64>, axis: &Vector2<f64>) -> [f64; 2] {
     let from = at - on_axis;
     [from.dot(axis), axis.x * from.y - axis.y * from.x]

@@ -18,7 +18,7 @@ pub(crate) const LATER_REACH: usize = 3;
 pub(crate) const MAX_CRESTS: usize = 3;
 /// Minimum alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
 const MIN_TRUST: f32 = 0.2;
-/// Samples along a normal, with one beyond the search distance at both ends; derived.
+/// Number of samples along a normal, with one beyond the search distance at both ends; derived.
 const MAX_SAMPLES: usize = 2 * FIRST_REACH + 3;
 const _: () = assert!(MAX_SAMPLES <= 2 * LANES, "two groups hold the samples of a normal");
 
@@ -132,7 +132,7 @@ fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Opti
         trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
         squares[k] = trusts[k] * (energy + floor);
     }
-    // Most samples are none: all are compared at once, because single branches are often mispredicted.
+    // Most samples are not crests: all are compared at once, because single branches are often mispredicted.
     let mut is_crest = [0u32; 2 * LANES];
     for k in 1..2 * LANES - 1 {
         let is_highest = (squares[k] >= squares[k - 1]) & (squares[k] > squares[k + 1]);

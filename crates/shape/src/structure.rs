@@ -1,4 +1,4 @@
-//! Edge directions compared in both directions: edges of the demonstration that the image lacks, and the reverse.
+//! Edge directions compared both ways: edges of the demonstration that the image lacks, and the reverse.
 //!
 //! [`crate::ShapeTemplate`] reads the image only at the demonstration's edges, so that a plate without holes agrees
 //! with every plate that also has holes. Here directions are compared at a grid of points over the whole part,
@@ -23,7 +23,7 @@ pub struct StructureAgreement {
     /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: these
     /// are neither covered nor of another part.
     pub visible: f64,
-    /// The share of the part that lies outside the image, in `[0, 1]`; the other values ignore it.
+    /// The share of the part that lies outside the image, in `[0, 1]`; `visible` ignores it.
     pub outside: f64,
 }
 
@@ -34,7 +34,7 @@ pub struct Structure {
     num_regions: usize,
     /// Demonstration pixels per pixel of the level that is compared.
     pixel_size: f64,
-    /// All points lie within this distance of it, in demonstration pixels.
+    /// All points lie within `reach` of `center`, in demonstration pixels.
     center: Point2<f64>,
     reach: f64,
     config: StructureConfig,
@@ -123,8 +123,8 @@ impl Structure {
         edges.into_iter().filter(|(region, _)| differs(*region)).map(|(_, at)| at).collect()
     }
 
-    /// Calls `visit` for every point inside the image, with its place there, the demonstration's direction turned into
-    /// the image, and the image's direction.
+    /// Calls `visit` for every point inside the image, with its position there, the demonstration's direction rotated
+    /// by the pose, and the image's direction.
     fn compare(
         &self,
         field: &GradientField,

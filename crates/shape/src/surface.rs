@@ -125,7 +125,7 @@ impl Surface {
         self.cells.iter().flat_map(|cell| &cell.points)
     }
 
-    /// Each cell, and the image's colours for it at a pose.
+    /// For each cell, sums over its points of the demonstration's and the image's colours at a pose.
     fn correlations(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Correlation> {
         let reader = PixelReader::new(image);
         in_lanes(Correlate { cells: &self.cells, reader, image_from_cutout: *image_from_cutout })
@@ -148,14 +148,14 @@ impl Surface {
         is_more(num_inside)
     }
 
-    /// The share of the points that lie there.
+    /// The share of the points that lie in `outline` after `outline_from_cutout`.
     #[cfg(test)]
     pub(crate) fn share_inside(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
         let is_inside = inside(outline, outline_from_cutout);
         self.points().filter(|point| is_inside(point)).count() as f64 / self.points().count() as f64
     }
 
-    /// The share of the points that lie there, from a sixteenth of them.
+    /// The same share, estimated from a sixteenth of the points.
     pub(crate) fn share_inside_roughly(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
         let is_inside = inside(outline, outline_from_cutout);
         let points = || self.points().step_by(16);
@@ -247,7 +247,8 @@ struct Correlation {
 }
 
 impl Correlation {
-    /// Of sums about a colour of the photo and one of the image: `taught`, `seen`, their squares and products.
+    /// From sums relative to a colour of the photo and one of the image: of `taught`, `seen`, their squares and their
+    /// products.
     fn about(
         [of_photo, of_image]: [[f64; 3]; 2],
         count: f64,
@@ -276,7 +277,7 @@ impl Correlation {
         self.products += other.products;
     }
 
-    /// Sums of squares about the mean of each channel: taught, seen; and of products.
+    /// Sums about the mean of each channel: of the taught squares, of the seen squares, and of the products.
     fn about_means(&self) -> [f64; 3] {
         let n = self.count as f64;
         let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;

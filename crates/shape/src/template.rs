@@ -14,8 +14,8 @@ use crate::sightings::FIRST_REACH;
 
 /// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
-/// Largest extent of the part at the finest level and smallest at the coarsest, in level pixels. Chosen by
-/// hand, not measured.
+/// Smallest extent of the part at the finest level (a smaller part is read at full resolution) and at the coarsest, in
+/// level pixels; the extent is less than twice as large. Chosen by hand, not measured.
 const FINEST_EXTENT: f64 = 400.0;
 const COARSEST_EXTENT: f64 = 32.0;
 /// If less than this share of the template is inside the image, it is scored as if this share were.
@@ -43,7 +43,7 @@ pub(crate) struct TemplateLevel {
     pub(crate) pixel_size: f64,
     /// Root mean square distance of the points from the centre, in demonstration pixels.
     pub(crate) radius_px: f64,
-    /// The largest.
+    /// Largest distance of a point from the centre, in demonstration pixels.
     reach_px: f64,
     pub(crate) points: Vec<EdgePoint>,
     lanes: PointLanes,
@@ -63,10 +63,10 @@ impl ShapeTemplate {
         Self::with_inner_edges(image, outline, config, 1.0)
     }
 
-    /// The same for the edges along the outline only.
+    /// As [`Self::new`], with the edges along the outline only.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::new`].
     pub(crate) fn of_outline(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
         Self::with_inner_edges(image, outline, config, 0.0)
     }
@@ -144,7 +144,7 @@ impl ShapeTemplate {
     }
 }
 
-/// How a level is read: fast during the search, exact during the climb.
+/// How a level is read: fast for the grid of poses, exact during the climb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LevelSampling {
     Nearest,
@@ -187,7 +187,7 @@ impl MatchedLevel<'_> {
         f64::from(sum) / f64::from(visible).max(MIN_VISIBLE)
     }
 
-    /// Sum over the points inside the image, and of their weights.
+    /// Weighted sum of the alignments over the points inside the image, and the sum of their weights.
     fn nearest_sums(&self, level: &TemplateLevel, map: &LevelMap) -> (f32, f32) {
         let (mut sum, mut visible) = (0.0f32, 0.0f32);
         for point in &level.points {

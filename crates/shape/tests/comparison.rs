@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity, Polygon};
 use sdg_shape::{CloseLook, GradientField, Picture, SearchConfig, ShapeSearch, TableColors};
 
-/// Largest error of a grasp beside the part, in pixels.
+/// A pose with a larger error, in pixels, lies beside the part.
 const BESIDE_PX: f64 = 3.0;
 
 /// The results from a start with errors of some pixels and degrees.

@@ -23,7 +23,7 @@ fn template_of((image, outline): &(RgbImage, Polygon)) -> ShapeTemplate {
     ShapeTemplate::new(image, outline, &ShapeConfig::default()).expect("a square has edges")
 }
 
-/// About the square's centre.
+/// A rotation about the square's centre.
 fn turned(degrees: f64) -> PlanarSimilarity {
     let center = Point2::new(100.0, 100.0);
     PlanarSimilarity::about(center, center, Angle::from_degrees(degrees), 1.0)
@@ -126,7 +126,7 @@ fn hiding_a_part_costs_about_what_is_hidden() {
     assert!((0.4..0.8).contains(&agreement), "{agreement}");
 }
 
-/// A third of the part is outside: a smaller scale brings more edges into view, and the pose gives way to it.
+/// A third of the part is outside: a smaller scale brings more edges into the image and shifts the pose.
 const CUT_OFF_TOLERANCE_PX: f64 = 3.0;
 
 #[test]

@@ -44,7 +44,7 @@ struct Samples {
     /// Row and column in the rimmed grid, at least 0 and below `RIMMED` - 1.
     row: Vec<f32>,
     column: Vec<f32>,
-    /// Direction in eighths of a turn, from 0 to 8.
+    /// Direction in eighths of a full rotation, from 0 to 8.
     direction: Vec<f32>,
     weight: Vec<f32>,
 }

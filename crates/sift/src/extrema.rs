@@ -16,7 +16,7 @@ use crate::scale_space::{BORDER, Octave};
 const BAND: usize = 32;
 /// Maximum number of steps to neighbouring samples in a fit.
 const MAX_STEPS: usize = 5;
-/// Minimum contrast of a fitted sample, as a fraction of the contrast threshold: the fit seldom doubles the
+/// Minimum contrast of a sample for a fit, as a fraction of the contrast threshold: the fit seldom doubles the
 /// contrast.
 const CANDIDATE_CONTRAST: f64 = 0.5;
 

@@ -27,7 +27,7 @@
 //! ```
 //! use sdg_sift::{Plane, RotationConfig, RotationEstimator, Sift, SiftConfig};
 //!
-//! // A part of five dots, and the same part turned by a quarter.
+//! // A part of five dots, and the same part rotated by 90°.
 //! let dots = [(60.0, 50.0, 6.0), (90.0, 52.0, 4.0), (75.0, 75.0, 5.0), (58.0, 82.0, 3.5), (95.0, 88.0, 4.5)];
 //! let image = |turned: bool| {
 //!     Plane::from_fn(150, 150, |x, y| {
@@ -74,7 +74,7 @@ pub use ransac::{KeypointPair, RansacConfig, SimilarityFit, fit_similarity};
 pub use rotation::{RotationConfig, RotationEstimate, RotationEstimator, RotationMethod, RotationTemplate};
 pub use sift::Sift;
 
-/// The README's example, which runs with the other examples.
+/// Includes the README, so that its example is tested with the other examples.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

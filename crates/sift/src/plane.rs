@@ -91,8 +91,8 @@ impl Plane {
         self.data[y * self.width + x]
     }
 
-    /// A black plane in the memory of an earlier one, because new pages take as much time
-    /// as a blur.
+    /// A plane in the memory of an earlier one, because new pages take as much time as a blur. The earlier values
+    /// remain until they are overwritten.
     pub(crate) fn recycled(width: usize, height: usize, mut data: Vec<f32>) -> Self {
         data.resize(width * height, 0.0);
         Self { width, height, data }

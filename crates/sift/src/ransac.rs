@@ -144,8 +144,8 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
     Some(SimilarityFit { image_from_template, inliers: best.inliers, residual_px, log10_false_alarms })
 }
 
-/// A similarity with the matches that agree, and the sum of their squared distances, in tolerances and clipped at
-/// one.
+/// The matches that agree with a similarity, and the sum of all matches' squared distances, in tolerances and clipped
+/// at one.
 struct Hypothesis {
     inliers: Vec<usize>,
     cost: f64,

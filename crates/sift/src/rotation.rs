@@ -74,7 +74,7 @@ pub enum RotationMethod {
         /// Matches that agree with the pose.
         inliers: usize,
         /// Keypoints of the template found at the pose, including repeated texture; the final pose is computed from
-        /// them.
+        /// them if there are at least as many as inliers.
         guided_matches: usize,
         /// Root mean square distance of the matches from which the final pose is computed, in pixels.
         residual_px: f64,

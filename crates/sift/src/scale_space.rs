@@ -20,7 +20,7 @@ pub(crate) struct Octave {
     pub levels: Vec<Plane>,
     /// Pixels of the image per pixel of the octave.
     pub pixel_size: f64,
-    /// Added to a pixel's index times `pixel_size`, it gives the position of the pixel's centre in the image.
+    /// Position in the image of the centre of pixel 0; that of pixel `i` is `i * pixel_size + center`.
     pub center: f64,
 }
 

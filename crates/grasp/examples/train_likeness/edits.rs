@@ -136,7 +136,7 @@ fn stretched(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
     let share = rng.random_range(STRETCH[0]..STRETCH[1]);
     let factor = if rng.random_bool(0.5) { 1.0 + share } else { 1.0 / (1.0 + share) };
     let middle = 0.5 * (SIDE as f32 - 1.0);
-    // One end keeps its position.
+    // The line at this distance from the middle keeps its position.
     let fixed = rng.random_range(-1.0..1.0f32) * 0.4 * SIDE as f32;
     let source = |i: usize| {
         let [x, y] = place(i).map(|k| k - middle);

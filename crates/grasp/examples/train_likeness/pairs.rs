@@ -41,7 +41,7 @@ const TINT: f32 = 0.1;
 const NOISE: f32 = 0.02;
 
 impl Pairs {
-    /// Nothing yet.
+    /// No examples.
     pub const EMPTY: Self = Self { bytes: Vec::new() };
 
     /// Generates the missing parts and searches for them; held-out parts use another seed.

@@ -17,7 +17,7 @@ use crate::pairs::changed;
 const HELD_OUT: usize = 4;
 /// Fraction of correct examples. Chosen by hand.
 const RIGHT_SHARE: f64 = 0.55;
-/// Fraction of correct examples whose photo is another picture of the part. Chosen by hand.
+/// Fraction of examples whose photo is another picture of the part. Chosen by hand.
 const OTHER_PHOTO_SHARE: f64 = 0.6;
 /// Fraction of correct examples that an edit of the photo makes wrong. Chosen by hand.
 const EDITED_SHARE: f64 = 0.25;

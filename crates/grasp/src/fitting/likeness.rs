@@ -13,7 +13,7 @@ use crate::verification::{PlacedDemonstration, SearchedImage, search};
 const WRONG_A_PICTURE: usize = 3;
 
 /// A pose that is not correct but within this distance of an instance, as a fraction of its diagonal and in radians,
-/// counts as neither correct nor wrong, because the part's height displaces it.
+/// counts as neither correct nor wrong, because the part's height may displace the pose.
 const NEARLY: (f64, f64) = (0.15, 0.3);
 
 /// A photo and an aligned picture.

@@ -75,9 +75,9 @@ pub enum FitEvent<'a> {
         /// The tried value.
         value: f64,
     },
-    /// The score's weights are fitted.
+    /// The score's weights have been fitted.
     Score(&'a ScoreReport),
-    /// A constant is fitted.
+    /// A constant has been fitted.
     Fitted(&'a ConstantReport),
 }
 

@@ -244,8 +244,9 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The same score with neutral values half-way between the medians of correct and wrong poses, so that a positive
-/// contribution supports the part. Size and outside are neutral at 0, their best value.
+/// The same score with other neutral values: half-way between the medians of correct and wrong poses, so that a
+/// positive contribution supports the part; for resemblance the median of all; for size and outside 0, their best
+/// value.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {
@@ -258,7 +259,7 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
         term.neutral = match k {
             0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
             6 => median(k, None),
-            // Evidence against the part is neutral up to the start of its range.
+            // The other terms are neutral up to the start of their range.
             8.. => term.range[0],
             _ => 0.0,
         };

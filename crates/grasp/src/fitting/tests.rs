@@ -1,4 +1,4 @@
-//! Fits on two small parts in each half, with a few pictures and one constant of each kind.
+//! Fits on two small parts in each half, with a few pictures and two constants.
 
 use image::{Rgb, RgbImage};
 use sdg_demonstration::{AugmentationConfig, Augmenter};
@@ -7,7 +7,7 @@ use sdg_geometry::{Angle, PlanarSimilarity, RotationalSymmetry};
 use super::*;
 use crate::teach::tests::demonstration;
 
-/// The L of the tests of teaching, in colours that depend on `idx`, with composed pictures.
+/// The L-shaped part of the tests of teaching, in colours that depend on `idx`, with composed pictures.
 fn part(idx: u8) -> FitPart {
     let mut taught = demonstration();
     taught.image = RgbImage::from_fn(taught.image.width(), taught.image.height(), |x, y| {

@@ -30,8 +30,8 @@ impl Proposals {
 pub(crate) struct PoseCandidate {
     /// The class's probability.
     pub(crate) class_probability: f64,
-    /// The class's probability, reduced for a proposal if the heads contradict each other or the place does not
-    /// resemble the demonstration.
+    /// The class's probability, reduced if the heads contradict each other, and changed by the comparison of the image
+    /// with the demonstration.
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
     /// The keypoints, each with the network's score; empty for a model without keypoints.

@@ -17,9 +17,9 @@ use super::consistency::ComparisonEvidence;
 use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// Maximum number of compared candidates of an image: those with the highest class and box scores. Each takes three to
-/// six views. In the paper's protocol, a maximum of 16 found no further part, and 616 of the 3200 pictures had five
-/// candidates or more.
+/// Maximum number of compared candidates of an image: those with the highest scores before the comparison. Each takes
+/// three to six views. In the paper's protocol, a maximum of 16 found no further part, and 616 of the 3200 pictures had
+/// five candidates or more.
 const MAX_COMPARED: usize = 5;
 /// Maximum number of candidates of an image whose poses are corrected before their features are compared at high
 /// resolution: the most likely ones. A maximum of four found no further part.
@@ -142,7 +142,7 @@ pub(super) fn best_first<T>(candidates: &mut [T], candidate: impl Fn(&T) -> &Pos
     candidates.sort_by(|a, b| candidate(b).network_score.total_cmp(&candidate(a).network_score));
 }
 
-/// The pose rotated by 180°, with the outline's box at the same place.
+/// The pose rotated by 180° about the centre of the marked box.
 fn turned(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> PlanarSimilarity {
     let center = demonstration.marks.bbox.center();
     pose.compose(&PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0))

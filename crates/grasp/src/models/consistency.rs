@@ -1,5 +1,5 @@
-//! A network's score: the probability of the class, reduced if the heads contradict each other or if the place does not
-//! resemble the demonstration.
+//! A network's score: the probability of the class, reduced if the heads contradict each other, and reduced or
+//! increased by the comparison of the place with the demonstration.
 //!
 //! Box, keypoints, mask and orientation of a detection are separate estimates of the part's pose, which agree on the
 //! part. On another object, the box fits that object, and the demonstration at the pose of the other heads fills little
@@ -70,7 +70,7 @@ pub(super) fn score(class_probability: f64, filled: f64, compared: Option<Compar
     let probability = class_probability.clamp(1.0 - MAX_PROBABILITY, MAX_PROBABILITY);
     let of_class = (probability / (1.0 - probability)).ln();
     let of_heads = of_class + WEIGHT * filled.max(MIN_FILLED).ln();
-    // A mean, not a sum: with scores close to 0 and 1, there would be no room for a threshold.
+    // A mean, because a sum would give scores so close to 0 and 1 that they leave no room for a threshold.
     let with = |ComparisonEvidence { log_odds, cosine }| {
         let of_features = cosine.map_or(0.0, |cosine| COSINE_WEIGHT * (cosine - NEUTRAL_COSINE));
         (of_heads + COMPARISON_WEIGHT * log_odds) / (1.0 + COMPARISON_WEIGHT) + of_features

@@ -17,9 +17,9 @@ use crate::taught::TaughtDemonstration;
 /// Chosen by hand, not measured.
 const MARGIN_PX: f64 = 24.0;
 
-/// The mask of a pipe, with 28 cells per side, overlaps the pipe's outline by only a third even at the exact pose.
-/// Whether it is the part is decided by the comparison with the demonstration. Chosen on fuel lines, a shipped part;
-/// the number of pictures is not recorded.
+/// The mask of a pipe, with 28 cells per side, overlaps the pipe's outline by only a third even at the exact pose. The
+/// required overlap is therefore low; the later comparison with the demonstration decides whether the mask shows the
+/// part. Chosen on fuel lines, a shipped part; the number of pictures is not recorded.
 fn rotation() -> RotationConfig {
     let mut config = RotationConfig::default();
     config.min_overlap = 0.3;
@@ -61,7 +61,8 @@ impl MaskMatcher {
     }
 
     /// The pose of the demonstration: by matched keypoints if enough of them agree, otherwise by the outline, which may
-    /// be wrong by 180° if both ends of the part look alike. `None` if neither gives an orientation.
+    /// be wrong by 180° if both ends of the part look alike. `None` if neither gives an orientation, or for an empty
+    /// mask.
     ///
     /// # Source
     /// Paper, section IV-D. In the paper the mask's centroid is the grasp; here the whole pose is estimated.

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct Uncertainty {
     /// Radius around the position in the plane, in metres.
     pub position_m: f64,
-    /// Angle in either direction.
+    /// Rotation in the plane, in either direction, in radians.
     pub yaw_rad: f64,
 }
 
@@ -45,7 +45,7 @@ pub struct Circumstances {
 pub struct ErrorLength {
     /// Error of a pose of full agreement, in pixels.
     pub pixels: f64,
-    /// Growth of the noise's logarithm per missing agreement.
+    /// Growth of the noise's logarithm per unit of missing agreement.
     pub by_disagreement: f64,
     /// Fraction of the marks' height times the slant.
     pub by_slant: f64,

@@ -12,7 +12,7 @@ const STEPS: usize = 120;
 pub struct FineTuning {
     /// Steps, learning rate, windows, early stop.
     pub training: TrainingConfig,
-    /// The part of the first stage that stays frozen.
+    /// The part of the detector that stays frozen.
     pub freeze: Freeze,
     /// Number of generated parts shown during teaching, beside the part and in its place.
     pub num_other_parts: usize,

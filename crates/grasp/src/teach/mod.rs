@@ -216,7 +216,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
     Ok(Taught { model, history: None })
 }
 
-/// Number of windows from which last layers are computed.
+/// Number of windows from which the last layers of our base weights are computed before training.
 const NUM_VIEWS: usize = 64;
 
 /// Teaches a model with a network by a plan.

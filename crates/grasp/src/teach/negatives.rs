@@ -107,7 +107,7 @@ pub(crate) struct Resemblances {
 }
 
 impl Resemblances {
-    /// The resemblance of other objects to the part: the mean of the agreements.
+    /// The resemblance of other objects to the part: the mean of the agreements, or a neutral value for too few scenes.
     pub(crate) fn resemblance(&self) -> f64 {
         if self.highest.len() < MIN_SCENES {
             return ScoreConfig::DEFAULT.resemblance.neutral;

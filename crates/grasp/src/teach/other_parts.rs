@@ -1,6 +1,6 @@
 //! Generated parts as negatives in the scenes of teaching.
 //!
-//! The seeds of these parts are separate from those of the shipped parts and of the parts for all measurements.
+//! None of these parts is a shipped part, and their seeds are separate from those of the parts for all measurements.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, SceneStyle};
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
@@ -40,7 +40,7 @@ const NUM_PICTURES: u64 = 16;
 pub(super) struct OnOtherParts {
     /// The network's highest score in each picture.
     pub(super) highest: Vec<f64>,
-    /// The network's score at the place of best agreement in each picture; 0 without a proposal.
+    /// The network's score at the sighting of best agreement in each picture that has one; 0 without a proposal.
     pub(super) best_agreement: Vec<f64>,
 }
 

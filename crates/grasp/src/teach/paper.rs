@@ -26,8 +26,8 @@ const HELD_BACK: usize = 200;
 /// Width and height of the samples, in pixels.
 const SAMPLE_SIZE: [u32; 2] = [640, 480];
 
-/// Detectron2's R50-FPN. With imported weights, stem, first stage and norms are frozen. From random values nothing is
-/// frozen: all layers learn, and the frozen norms, which would have no effect, are replaced by group norms.
+/// Detectron2's R50-FPN. With imported weights, stem, res2 and norms are frozen. From random values nothing is frozen:
+/// all layers learn, and the frozen norms, which would have no effect, are replaced by group norms.
 pub(super) fn network(kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
     let mut config = r50_detectron2(kind);
     if !has_base_weights {

@@ -1,4 +1,4 @@
-//! Detections of a search of an older frame, carried forward to the newest frame.
+//! Detections that a search found in an older frame, carried forward to the newest frame.
 //!
 //! ```text
 //! detections in frame k ─┬─ on a track, at its pose in frame k ─── near it: likeness, marks and network score are taken
@@ -84,7 +84,7 @@ pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placem
 }
 
 impl Track {
-    /// Marks the track as the better pose of another one.
+    /// Marks the track as a better pose of the part of track `id`.
     pub(super) fn replacing(mut self, id: u64) -> Self {
         self.standing = Standing::Arriving { replaces: Some(id) };
         self

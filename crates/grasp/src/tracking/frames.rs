@@ -54,8 +54,8 @@ impl FrameBuffer {
         self.frames.iter().find(|frame| frame.number == number)
     }
 
-    /// The frame to which a result of frame `number` is carried next; `None` if this is the newest, into which every
-    /// track is followed.
+    /// The frame to which a result of frame `number` is carried next; `None` if the newest frame is not much later,
+    /// because every track is followed into that one anyway.
     pub(super) fn next_after(&self, number: u64, time: Duration) -> Option<&BufferedFrame> {
         let newest = self.newest()?;
         if newest.time.saturating_sub(time) <= MAX_STRIDE {

@@ -37,15 +37,15 @@ const MAX_CORRECTION_PX: f64 = 3.0;
 const MAX_CORRECTION_RAD: f64 = 0.06;
 /// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;
-/// The comparing network is evaluated again if the ratio of the agreement to that at its last evaluation is outside
-/// this range. Chosen by hand: an evaluation takes about as long as following.
+/// A close look is repeated if the ratio of the agreement to that at the last close look is below this value or above
+/// its inverse. Chosen by hand: a close look takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
-/// The comparing network is evaluated again after this time. Chosen by hand.
+/// A close look is repeated after this time. Chosen by hand.
 const MAX_LOOK_AGE: Duration = Duration::from_secs(1);
 /// Number of frames whose poses are kept for running searches. Chosen by hand: two seconds at 100 frames per second.
 const MAX_HISTORY: usize = 200;
 
-/// The comparing network's log-odds, and the time of their computation.
+/// The last close look, and its time.
 #[derive(Debug, Clone, Copy)]
 struct LastLook {
     look: CloseLook,
@@ -296,7 +296,7 @@ impl Track {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }
 
-    /// The place as an input of the verdict.
+    /// The followed part as an input of the verdict.
     pub(super) fn sighting<'a>(
         &self,
         detector: &'a PartDetector,

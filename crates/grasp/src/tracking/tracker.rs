@@ -145,9 +145,9 @@ impl Tracker {
     }
 
     /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
-    /// it is the first, a followed part is not at its place, or the picture changed elsewhere, as far as
-    /// [`TrackerConfig::moves_within`] allows this to be detected. Its result goes to [`Self::answer`]. A running
-    /// search is abandoned.
+    /// it is the first or was taken long after the last, a followed part is not at its place, or the picture changed
+    /// elsewhere, as far as [`TrackerConfig::moves_within`] allows this to be detected. Its result goes to
+    /// [`Self::answer`]. A running search is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;
         self.search_newest()
@@ -219,7 +219,7 @@ impl Tracker {
         followed.map(|tracked| tracked.part.detection.bbox).collect()
     }
 
-    /// The part of a frame in which changes count.
+    /// The area of a frame in which changes count.
     fn watched(&self, picture: &RgbImage) -> PixelRect {
         let (width, height) = picture.dimensions();
         let region = self.detector.region().filter(|region| region.check([width, height]).is_ok());
@@ -506,7 +506,7 @@ impl Tracked {
         self.part.unseen_for = captured.saturating_sub(self.track.time);
     }
 
-    /// Whether the part was followed in the frame before.
+    /// Whether the part was lost in the frame captured at this time.
     fn was_just_lost(&self, captured: Duration) -> bool {
         self.track.standing == Standing::Lost(captured)
     }

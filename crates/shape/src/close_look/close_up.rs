@@ -11,17 +11,21 @@ use crate::frame::Frame;
 /// The longer side of the part, and the side of the frame, in pixels. The surroundings of the part show the table.
 const PART_SIDE: f64 = 96.0;
 pub(super) const SIDE: usize = 120;
-/// Cells at least this deep inside the outline show the part; cells at such depths below 0 show its surroundings.
+/// Cells at least this deep inside the outline show the part; cells at the depths `AROUND`, outside the outline, show
+/// its surroundings.
 const INSIDE: f32 = 2.5;
 const AROUND: std::ops::Range<f32> = -12.0..-3.0;
-/// A cell shows the table if it lies within this many spreads of one of the table's colours, and that colour covers at
-/// least this share of the part's surroundings.
+/// A cell shows the table if its colour lies within `TABLE_SPREADS` of one of the table's colours. Colours of the
+/// picture count as the table's if at least `TABLE_SHARE` of the part's surroundings lie within `AROUND_SPREADS` of
+/// them.
 const TABLE_SPREADS: f32 = 2.0;
 const AROUND_SPREADS: f32 = 2.5;
 const TABLE_SHARE: f32 = 0.12;
-/// A cell does not show the part if picture and expected colour differ by at least this, in units of [`lab`].
+/// A cell does not show the part if picture and expected colour differ by more than this: root mean square over the
+/// channels, in units of [`lab`].
 const OTHER_COLOR: f32 = 10.0;
-/// A window counts by the photo's edges in it, if they reach this share of the strongest.
+/// A window counts if the energy of the photo's edges in it exceeds this share of the strongest window's; that energy
+/// is its weight.
 pub(super) const MIN_EDGES: f32 = 0.02;
 /// Windows at most this far outside the outline still show its edge.
 const NEAR: f32 = -6.0;
@@ -49,7 +53,7 @@ type Pair = ([f32; 3], [f32; 3]);
 pub(crate) struct Seen {
     colors: Vec<Option<[f32; 3]>>,
     pub(super) gradients: Gradients,
-    /// The correlation of the photo's windows with it.
+    /// The correlation of each of the photo's windows with the picture.
     pub(super) fits: Vec<f32>,
 }
 
@@ -90,7 +94,7 @@ impl CloseUp {
         Seen { colors, gradients, fits }
     }
 
-    /// The close look without the likeness and the mirror image.
+    /// The close look without likeness, details and mirror image.
     pub(crate) fn look(&self, seen: &Seen, table: &TableColors) -> CloseLook {
         let is_seen = cell_means(&seen.colors);
         let fits = &seen.fits;
@@ -129,7 +133,7 @@ impl CloseUp {
         f64::from(without as u32) / f64::from(all.max(1) as u32)
     }
 
-    /// Mean energy inside the outline above twice the photo's energy and the noise.
+    /// Mean energy inside the outline that exceeds the sum of twice the photo's energy and the noise.
     fn added(&self, seen: &Seen) -> f64 {
         const DEEP: f32 = 3.0;
         const NOISE: f32 = 0.1;
@@ -141,7 +145,7 @@ impl CloseUp {
         f64::from(cells.iter().map(beyond).sum::<f32>()) / (cells.len() as f64).max(1.0)
     }
 
-    /// The cells where the picture shows its table and the photo shows the part.
+    /// The share of the cells inside the outline where the picture shows its table and the photo shows the part.
     fn bare(&self, seen: &Seen, table: &TableColors) -> f64 {
         let colors = cell_labs(&seen.colors);
         let around: Vec<[f32; 3]> = cells_where(&colors, |i| AROUND.contains(&self.cell_depth[i])).collect();
@@ -213,7 +217,7 @@ impl CloseUp {
     }
 }
 
-/// Means over cells; `None` for a cell with less than half of its pixels.
+/// Means over cells; `None` for a cell in which less than half of the pixels have a colour.
 fn cell_means(pixels: &[Option<[f32; 3]>]) -> Vec<Option<[f32; 3]>> {
     let mut sums = vec![([0.0f32; 3], 0usize); num_cells(SIDE)];
     for (i, color) in pixels.iter().enumerate() {

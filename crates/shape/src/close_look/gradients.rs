@@ -18,7 +18,7 @@ use crate::lanes::in_lanes;
 pub(super) const CELL: usize = 3;
 /// Pixels within this distance of the outline belong to its edge; pixels further inside belong to the part's surface.
 const RIM_PX: f32 = 2.5;
-/// Squared largest shift of a window, in pixels: two along a row or column and one diagonally.
+/// Square of the largest shift of a window, in pixels: two along one axis and one along the other.
 const MAX_SHIFT_SQUARED: isize = 5;
 const REACH: usize = 2;
 /// Gradients below this are noise: the first in grey levels per pixel, the second as a share of the root mean square.
@@ -26,14 +26,14 @@ const NOISE: f32 = 1.5;
 const NOISE_SHARE: f32 = 0.4;
 /// Mean squared length of `v` that is added to every window, so that two empty windows do not correlate.
 const EMPTY: f32 = 0.01;
-/// Binomial-like weights of a Gaussian of 1.2 pixels.
+/// Weights of a Gaussian with a standard deviation of 1.2 pixels.
 const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0148];
 
 /// The gradients of one picture in the frame, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Gradients {
     side: usize,
-    /// x and y of `v`, then of `v` at twice its angle.
+    /// x and y: in `signed` of `v`, in `doubled` of `v` at twice its angle.
     signed: [Vec<f32>; 2],
     doubled: [Vec<f32>; 2],
     /// Squared lengths, equal for both.
@@ -74,7 +74,7 @@ impl Gradients {
         Self { side, signed, doubled, energy }
     }
 
-    /// The same, zero where `counts` does not hold.
+    /// These gradients, set to zero where `counts` does not hold.
     pub(super) fn only(mut self, counts: impl Fn(usize) -> bool) -> Self {
         for i in (0..self.energy.len()).filter(|i| !counts(*i)) {
             self.signed.iter_mut().chain(&mut self.doubled).for_each(|values| values[i] = 0.0);
@@ -100,9 +100,9 @@ pub(super) struct Expected {
     /// x and y of the surface's gradients, and of the outline's edge at twice its angle; 0 elsewhere.
     surface: [Vec<f32>; 2],
     rim: [Vec<f32>; 2],
-    /// 1 where one of them is present and a shifted window stays inside the frame.
+    /// 1 at pixels of the surface and of the rim that stay inside the frame at every shift, else 0.
     counts: Vec<f32>,
-    /// Rows that contain one of them.
+    /// Rows that contain such pixels.
     rows: Range<usize>,
     /// Mean squared length in each window.
     pub(super) energy: Vec<f32>,
@@ -206,7 +206,7 @@ impl WithSimd for ShiftedSums<'_> {
     }
 }
 
-/// Cells along a side of the frame, and its square.
+/// Number of cells of a square frame.
 pub(super) fn num_cells(side: usize) -> usize {
     (side / CELL) * (side / CELL)
 }
@@ -232,7 +232,8 @@ fn window_means(cells: &[f32], side: usize) -> Vec<f32> {
     (0..cells.len()).map(|i| (above[i] + here[i] + below[i]) / pixels).collect()
 }
 
-/// Brightness from 0 to 255; outside the picture, that of the nearest pixel of the row, or of the row above.
+/// Brightness from 0 to 255. A pixel outside the picture takes it from the next pixel inside to the left, else to the
+/// right, else above, else below.
 fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
     let mut brightness: Vec<Option<f32>> =
         colors.iter().map(|color| color.map(|color| 85.0 * color.iter().sum::<f32>())).collect();

@@ -1,6 +1,7 @@
 //! The result of a close look.
 
-/// Measurements of a close look at a pose. For the photo itself all are 0, except the fits, which are 1.
+/// Measurements of a close look at a pose. For the photo itself `bare`, `no_rim` and `added` are 0, and `fit` is about
+/// 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloseLook {
     /// [`crate::Likeness::log_odds`].
@@ -15,7 +16,8 @@ pub struct CloseLook {
     pub no_rim: f64,
     /// Mean energy of the edges inside the outline that are absent from the photo.
     pub added: f64,
-    /// The fit of the mirror image instead; `None` where the photo equals its mirror image.
+    /// The mirror image compared with the photo; `None` where the two are equal, for a part of revolution, and where
+    /// the pose is not plausible.
     pub mirrored: Option<RivalFit>,
 }
 
@@ -34,6 +36,6 @@ pub struct RivalFit {
     pub margin: f64,
     /// Mean correlation of the rival's edges that the photo lacks.
     pub fit: f64,
-    /// The share of the photo's edges in which they differ; if it is small, the margin is weak evidence.
+    /// The share of the photo's edges in which rival and photo differ; if it is small, the margin is weak evidence.
     pub share: f64,
 }

@@ -3,11 +3,11 @@
 //!
 //! ```text
 //! photo ───────────────────────────┐
-//! picture, turned and sized as it ─┼─ 120×120 pixels, the part 96 long ─┬─ colours by cell, table's colours ─ bare
-//! mirror image, where it fits best ┘                                    └─ signed gradients by window ─ fit, weak, added, rival
+//! picture, sampled at the pose ────┼─ 120×120 pixels, the part 96 long ─┬─ colours by cell, table's colours ─ bare
+//! mirror image, where it fits best ┘                                    └─ gradients ─ fit, no_rim, added, mirrored
 //! ```
 //! [`crate::Structure`] measures agreement. This module measures contradiction: a hand that covers the part contradicts
-//! nothing, but visible table where the part should be does. The numbers are not bounded.
+//! nothing, but visible table where the part should be does.
 
 mod close_up;
 mod gradients;

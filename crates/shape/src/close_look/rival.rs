@@ -21,30 +21,32 @@ use crate::gradient_field::GradientField;
 use crate::parallel;
 use crate::template::ShapeTemplate;
 
-/// Number of turns at which the rival is laid over the photo, number of those followed to full resolution, and number
-/// of the best that are tried in pictures.
+/// Number of angles at which the rival is laid over the photo, number of those poses that are followed to the
+/// agreement's level, and number of the best that are tried in pictures.
 const NUM_TURNS: usize = 36;
 const NUM_FOLLOWED: usize = 14;
 const NUM_STARTS: usize = 4;
-/// Minimum distance between starts; the second is a share of the edges' mean distance from the centre.
+/// Minimum difference between starts, in angle or in position; the latter as a share of the edges' root mean square
+/// distance from the centre.
 const APART_RAD: f64 = 0.2;
 const APART_SHARE: f64 = 0.25;
-/// Largest distance from a start in a picture, which shows the part in perspective.
+/// Largest distance of a refined pose from its start: a picture shows the part in perspective.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
-/// A turn at which the photo's edges agree with themselves by at least this is tried in pictures. It is compared
+/// A rotation at which the photo's edges agree with themselves by at least this is tried in pictures. It is compared
 /// closely if its agreement with the picture is lower than that of the original pose by at most the second value.
 const MIN_RESEMBLANCE: f64 = 0.4;
 const MAX_LOSS_BY_TURN: f64 = 0.03;
 /// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// Minimum difference and minimum gain of a turn. Chosen by hand.
+/// Minimum share of differing edges, and minimum gain, of another rotation that replaces the pose. Chosen by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 const MIN_GAIN_BY_TURN: f64 = 0.1;
-/// A window differs if the other's edges correlate with its own by less than this.
+/// A window differs if the edges of the two pictures in it correlate by less than this.
 const SAME: f32 = 0.6;
 
-/// The poses at which `template` resembles the photo most, from its own pixels to the cut-out's: the best by agreement
-/// with the photo's gradients, among the poses `further` and all turns about the centre, for which `counts` holds.
+/// The poses, from the template's own pixels to the cut-out's, at which `template` resembles the photo most. They are
+/// the best by agreement with the photo's gradients among the poses `further` and the rotations about the centre; only
+/// poses for which `counts` holds are considered.
 fn resembling(
     template: &ShapeTemplate,
     field: &GradientField,
@@ -77,12 +79,12 @@ fn resembling(
     starts
 }
 
-/// Another part that may lie there instead.
+/// An alternative explanation of the picture: the mirror image, or the part itself turned.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     close_up: CloseUp,
     template: ShapeTemplate,
-    /// The pose of greatest resemblance with the photo: from its own pixels to the cut-out's.
+    /// The poses of greatest resemblance with the photo: from the rival's own pixels to the cut-out's.
     starts: Vec<PlanarSimilarity>,
 }
 
@@ -129,8 +131,8 @@ impl Rival {
         Self { close_up: close_up.clone(), template: template.clone(), starts }
     }
 
-    /// The turn at which the photo fits the picture better than at `pose`, where the two differ; `None` if there is no
-    /// such turn.
+    /// The pose of another rotation at which the photo fits the picture better than at `pose`, compared where the two
+    /// differ; `None` if there is none.
     pub(crate) fn better_turn(
         &self,
         image: &RgbImage,
@@ -153,7 +155,7 @@ impl Rival {
         best.map(|(turn, _)| self.template.captured(field, &turn, &REACH))
     }
 
-    /// The rival's possible pose near a pose of the photo, and its agreement there.
+    /// The rival's possible poses at a pose of the photo, one for each start, and its agreement at each.
     fn followed(&self, field: &GradientField, pose: &PlanarSimilarity) -> Vec<(PlanarSimilarity, f64)> {
         parallel::map(&self.starts, |start| self.template.captured_roughly(field, &pose.compose(start), &REACH))
     }
@@ -179,7 +181,7 @@ impl CloseUp {
         self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
 
-    /// The photo compared with this rival, which lies there by `own_from_photo`.
+    /// The photo compared with this rival, which lies on the photo by `own_from_photo`.
     fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let both = self.laid_over(photo, own_from_photo);
         let fit = both.photos.fit(&seen.fits);
@@ -193,7 +195,7 @@ impl CloseUp {
         let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
-        // Each picture shows its part alone.
+        // The gradients of each picture outside its part are set to zero.
         let of_rival = gradients.only(|i| depth[i] > -4.0);
         let of_photo = photo.gradients.clone().only(|i| photo.depth[i] > -4.0);
         let photos = Differing::new(&photo.expected, &of_rival);
@@ -204,7 +206,7 @@ impl CloseUp {
     fn depths(&self, photo: &CloseUp, own_from_photo: &PlanarSimilarity) -> Vec<f32> {
         let place = |at: [f64; 2]| self.frame.place_of(&own_from_photo.apply(&photo.frame.place(at)));
         let [first, right] = [place([0.5, 0.5]), place([1.5, 0.5])];
-        // One pixel to the right; one pixel down is that vector turned by a quarter.
+        // One pixel to the right; one pixel down is that vector rotated by 90°.
         let [along, across] = [right[0] - first[0], right[1] - first[1]];
         let depth_at = |[x, y]: [f64; 2]| {
             let (column, row) = ((x + 1.0) as usize, (y + 1.0) as usize);
@@ -229,7 +231,7 @@ struct LaidOver {
 }
 
 impl LaidOver {
-    /// The extent of their differences, as a share of the photo's edges.
+    /// The extent of the differences between photo and rival, as a share of the photo's edges.
     fn share(&self, photo: &CloseUp) -> f64 {
         let all: f32 = photo.expected.energy.iter().sum();
         f64::from((self.photos.sum() + self.rivals.sum()) / all.max(f32::MIN_POSITIVE))
@@ -254,7 +256,7 @@ impl Differing {
         self.windows.iter().map(|(_, differs)| differs).sum()
     }
 
-    /// Their correlation with a picture, given the correlations of the picture's windows.
+    /// The correlation of these edges with a picture, given the correlations of the picture's windows.
     fn fit(&self, with_picture: &[f32]) -> f32 {
         let fit: f32 = self.windows.iter().map(|&(i, differs)| differs * with_picture[i]).sum();
         fit / self.sum().max(f32::MIN_POSITIVE)

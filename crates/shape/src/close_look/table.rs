@@ -8,8 +8,8 @@ const NUM_COLORS: usize = 8;
 const SIDE: u32 = 60;
 /// Rounds of the clustering; it converges earlier.
 const ROUNDS: usize = 8;
-/// Each further colour starts at the pixel whose distance to all earlier colours is exceeded by this share of the
-/// pixels; the farthest pixel would be a highlight.
+/// Each further colour starts at the pixel whose distance to the nearest earlier colour is this quantile of all pixels'
+/// distances; the farthest pixel would be a highlight.
 const START_QUANTILE: f64 = 0.97;
 /// Minimum spread of a colour, in units of [`lab`]: noise and shading alone cause this much.
 const MIN_SPREAD: f32 = 3.0;

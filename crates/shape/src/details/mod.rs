@@ -1,8 +1,9 @@
 //! Whether the picture shows the photo's features at the photo's places: holes, lugs, print, lengths.
 //!
-//! A second network beside the likeness ([`crate::likeness`]), which sees 64 pixels and knows parts from background:
-//! this one sees 128, and was trained on rendered parts and their look-alikes alone, in which one feature is moved,
-//! absent, added or of another size, or the print differs (docs/decisions/026-details.md).
+//! A second network beside the likeness ([`crate::likeness`]). The likeness network has an input of 64 pixels and
+//! distinguishes parts from background. This network has an input of 128 pixels and was trained only on rendered parts
+//! and their look-alikes. In a look-alike one feature is moved, absent, added or of another size, or the print differs
+//! (docs/decisions/026-details.md).
 
 mod network;
 
@@ -15,7 +16,7 @@ use crate::likeness::exposed_values;
 
 /// Minimum longer side of the part in photo and picture, in pixels.
 const MIN_PX: f64 = 40.0;
-/// Below this size only present features count: a bearing of 50 pixels is mistaken for another one, although the
+/// Below this size only evidence for the part counts: a bearing of 50 pixels is mistaken for another one, although the
 /// training set contains such parts.
 const MIN_PX_AGAINST: f64 = 75.0;
 /// The part's longer side in the network's input.
@@ -27,7 +28,7 @@ pub struct Details {
     frame: Frame,
     colors: Vec<Option<[f32; 3]>>,
     inside: Vec<bool>,
-    /// The same for a picture that fills the frame.
+    /// The photo's features, used where the picture covers the whole frame.
     features: Features,
 }
 
@@ -50,8 +51,8 @@ impl Details {
         Some(if is_small { log_odds.max(0.0) } else { log_odds })
     }
 
-    /// Squares of the image, in its pixels, that probably differ from the photo; empty where nothing counts against the
-    /// pose.
+    /// Squares of the image, in its pixels, that probably differ from the photo; empty where the part is too small for
+    /// evidence against the pose.
     pub fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Polygon> {
         if self.longer_side_px(image_from_cutout) < MIN_PX_AGAINST {
             return Vec::new();
@@ -79,7 +80,7 @@ impl Details {
         let picture = self.frame.sampled(image, image_from_cutout);
         let is_seen: Vec<bool> = picture.iter().map(Option::is_some).collect();
         let of_picture = features(&picture, &self.inside, &is_seen);
-        // Beyond the picture's edge both are compared with nothing.
+        // Where the frame extends beyond the picture, the photo's features get the same mask of visible pixels.
         let cut = is_seen.contains(&false).then(|| features(&self.colors, &self.inside, &is_seen));
         let of_photo = cut.as_ref().unwrap_or(&self.features);
         Some(Network::shipped().compared(of_photo, &of_picture, &self.inside))
@@ -149,7 +150,7 @@ mod tests {
     fn nothing_speaks_against_a_small_part_and_a_tiny_one_is_not_judged() {
         let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
         let taught = Details::new(&plate(205.0, 1.0), &outline);
-        // The same, and a table without it.
+        // The same plate, and a table without it.
         let at = |scale: f64, picture: &RgbImage| {
             taught.log_odds(picture, &PlanarSimilarity { scale, ..PlanarSimilarity::IDENTITY })
         };

@@ -89,7 +89,7 @@ impl Network {
         })
     }
 
-    /// Of [`NUM_CHANNELS`] values a pixel, row by row.
+    /// The features of a picture, given [`NUM_CHANNELS`] values per pixel, row by row.
     pub(super) fn features(&self, values: Vec<f32>) -> Features {
         Arch::new().dispatch(Tower { network: self, values })
     }

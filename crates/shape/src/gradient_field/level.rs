@@ -16,7 +16,8 @@ pub(crate) struct GradientLevel {
     height: usize,
     /// Each with a fourth number, so that it is read in one load.
     samples: Vec<[f32; 4]>,
-    /// Samples per row, and the index that the level's first sample would have: 0, or below 0 in a window.
+    /// Samples per row, and the index of the first sample in a level with that number of samples per row; 0 in a whole
+    /// level.
     stride: usize,
     before: usize,
     floor: f32,
@@ -26,7 +27,7 @@ pub(crate) struct GradientLevel {
 /// Values needed for every interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    /// Width and height, and the last pixel of each.
+    /// Width and height, and the indices of the last column and row.
     size: [f32; 2],
     last: [f32; 2],
     /// The last pixel that has a neighbour, and the index distance of that neighbour.
@@ -173,7 +174,7 @@ pub(crate) fn whole(value: f32) -> u32 {
     (value + TWO_TO_23).to_bits() & 0x007f_ffff
 }
 
-/// Minimum energy of an edge, given the energy of the quiet quarter.
+/// Minimum energy of an edge, given the lower quartile of the energies.
 pub(super) fn floor_of(quiet: f32, config: &GradientConfig) -> f32 {
     config.min_gradient.powi(2) + config.noise_factor * quiet
 }
@@ -187,9 +188,9 @@ fn directions(samples: &mut [[f32; 4]], floor: f32) {
     }
 }
 
-/// Energy of the pixels of the quiet quarter, read from at most a few thousand of them.
+/// Lower quartile of the pixels' energies, estimated from at most a few thousand pixels.
 pub(super) fn quiet_energy(samples: &[[f32; 4]]) -> f32 {
-    // A prime stride does not coincide with rows or with a periodic texture.
+    // An odd stride rarely coincides with rows or with a periodic texture.
     let stride = (samples.len() / 4096).max(1) | 1;
     let mut energies: Vec<f32> = samples.iter().step_by(stride).map(|s| s[0]).collect();
     if energies.is_empty() {

@@ -38,7 +38,7 @@ impl Planes {
         Self { width, height, channels }
     }
 
-    /// Part of it, given its upper left corner.
+    /// A part of the planes, given its upper left corner and its size.
     fn cut(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Self {
         let mut channels = [(); 3].map(|()| Vec::with_capacity(width * height));
         for (cut, channel) in channels.iter_mut().zip(&self.channels) {
@@ -185,8 +185,8 @@ impl TensorRow {
         Self { tr: zeros.clone(), vx: zeros.clone(), vy: zeros }
     }
 
-    /// Sums the three channels' tensors; one-sided differences at the upper and lower border count
-    /// half, which only weakens gradients there.
+    /// Sums the three channels' tensors; differences at the border are one-sided and halved, which only weakens
+    /// gradients there.
     fn compute(&mut self, blurred: &BlurredRows, row: isize, rows: isize) {
         let width = blurred.width;
         // Central difference, the blur's gain, and the mean over three channels.

@@ -9,8 +9,8 @@
 //! │    └────────┘          │
 //! └────────────────────────┘
 //! ```
-//! A search follows few places to the finest level; for a picture of twelve megapixels with a small part these are a
-//! tenth of its pixels.
+//! A search follows few places to the finest level; for a picture of twelve megapixels with a small part, the windows
+//! around them contain a tenth of the pixels.
 
 use std::sync::OnceLock;
 

@@ -3,7 +3,7 @@
 //! ```text
 //! cut-out ────────────────────────┐
 //!                                 ├─ 64×64 pixels each, the part about 53 long ─ network ─ log-odds of the same part
-//! picture, turned and sized as it ┘
+//! picture, sampled at the pose ───┘
 //! ```
 //! The agreements of edges and colours measure the amount of difference. The network distinguishes the causes: an
 //! object that covers the part, its shadow, a highlight, or a hole at a wrong place. It was trained on generated parts

@@ -10,7 +10,7 @@ use super::pair::{NUM_CHANNELS, SIDE};
 use crate::error::ShapeError;
 use crate::layers::{Layer, Linear, answered, convolved, layer, pooled};
 
-/// The convolutions: 64, 32, 16, 16, 8, 8 and 4 pixels per side.
+/// The convolutions: from 64 pixels per side to 32, 16, 16, 8, 8 and 4.
 pub const LAYERS: [Layer; 6] = [
     layer(NUM_CHANNELS, 16, 2),
     layer(16, 32, 2),

@@ -11,14 +11,14 @@ pub const SIDE: usize = 64;
 pub const NUM_CHANNELS: usize = 8;
 /// The part's longer side in the input; the surroundings of the part show whether its outline is there.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
-/// Mean brightness of the part, in photo and picture, after exposure is normalised; four times this value is white, and
-/// brighter values are clipped.
+/// Mean brightness of the part, in photo and picture, after exposure is normalised. Values above `MAX`, four times this
+/// value, are clipped.
 const MEAN: f32 = 0.5;
 const MAX: f32 = 2.0;
 /// Limits the brightening of a black part.
 const DARK: f32 = 0.02;
 
-/// A photo's colours, and a flag for those that count.
+/// A photo's colours, and whether each pixel lies inside the outline.
 #[derive(Debug, Clone)]
 pub(super) struct Photo {
     frame: Frame,
@@ -75,7 +75,7 @@ fn values(photo: &[Option<[f32; 3]>], picture: &[Option<[f32; 3]>], inside: &[bo
     values
 }
 
-/// Colours with normalised exposure: their mean inside is [`MEAN`]; 0 where there is none.
+/// Colours with normalised exposure: their mean inside is [`MEAN`]; 0 where there is no colour.
 pub(crate) fn exposed_values(colors: &[Option<[f32; 3]>], inside: &[bool]) -> impl Iterator<Item = [f32; 3]> {
     let gain = gain(colors, inside);
     colors.iter().map(move |color| exposed(color, gain))
@@ -131,13 +131,13 @@ mod tests {
     fn the_same_part_looks_the_same_however_it_lies_and_is_lit() {
         assert_eq!(difference(&taught().beside(&photo(1.0), &PlanarSimilarity::IDENTITY)), 0.0);
         assert!(difference(&taught().beside(&photo(0.6), &PlanarSimilarity::IDENTITY)) < 0.05);
-        // The picture and the pose turned by a quarter.
+        // The picture and the pose rotated by 90°.
         let turned = image::imageops::rotate90(&photo(1.0));
         let pose =
             PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: f64::from(turned.width()), ty: 0.0 };
         let pair = taught().beside(&turned, &pose);
         assert!(difference(&pair) < 0.02, "{}", difference(&pair));
-        // After another half turn the corner is elsewhere.
+        // At a pose rotated by 180° the corner is elsewhere.
         let center = Point2::new(80.0, 60.0);
         let wrong = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
         assert!(difference(&taught().beside(&photo(1.0), &wrong)) > 0.1);

@@ -1,4 +1,4 @@
-//! The template at every turn and scale that is tried, as offsets into the look-up tables.
+//! The template at every angle and scale that is tried, as offsets into the look-up tables.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, tab
 /// of it in both directions. Derived from the spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
 
-/// One turn and scale.
+/// One angle and scale.
 #[derive(Debug, Clone)]
 pub(crate) struct Variant {
     pub(crate) angle_rad: f64,
@@ -25,11 +25,11 @@ struct Look {
     dx: i16,
 }
 
-/// All turns and scales of one template, ordered by angle.
+/// All angles and scales of one template, ordered by angle.
 #[derive(Debug, Clone)]
 pub(crate) struct Bank {
     pub(crate) variants: Vec<Variant>,
-    /// Scales of every angle.
+    /// Number of scales at every angle.
     pub(crate) num_scales: usize,
     /// Step of the angle.
     pub(crate) angle_step_rad: f64,
@@ -40,7 +40,7 @@ pub(crate) struct Bank {
 }
 
 impl Bank {
-    /// Turns and scales at most `num_points` of `points`, seen on a level whose pixel is `pixel_size` demonstration
+    /// Rotates and scales at most `num_points` of `points`, for a level whose pixel is `pixel_size` demonstration
     /// pixels; `log_scales` are the smallest and the largest ln scale.
     pub(crate) fn new(points: &[EdgePoint], num_points: usize, pixel_size: f64, log_scales: [f64; 2]) -> Self {
         let sampled = sample_by_weight(points, num_points);

@@ -1,8 +1,8 @@
 //! Searches a whole image for the taught part, without a network or training.
 //!
 //! ```text
-//! demonstration ─ edge points of a coarse level ─ Bank: every turn and scale as shifts into tables
-//! image ─ GradientField ─ coarse level ─ Responses: a look-up table a direction
+//! demonstration ─ edge points of a coarse level ─ Bank: every angle and scale as shifts into tables
+//! image ─ GradientField ─ coarse level ─ Responses: look-up tables for each direction
 //!                                           │
 //!                    sweep: every place × every variant ─ local maxima of every scale: starts
 //!                                           │
@@ -62,7 +62,8 @@ pub struct SearchConfig {
     /// above that, points repeat.
     pub num_points: usize,
     /// Maximum number of starts of the sweep that are climbed at the template's coarsest level, 8 to 4096, the best of
-    /// every scale first. At least 64 are climbed; more only if parts are found and further starts resemble theirs.
+    /// every scale first. The first 64 are always climbed; more only if parts are found and further starts resemble
+    /// theirs.
     pub max_starts: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
@@ -104,7 +105,7 @@ pub struct Match {
     pub evidence: Evidence,
 }
 
-/// A place that was followed to full resolution.
+/// A place that was followed, and its agreement.
 #[derive(Debug, Clone, Copy)]
 struct Found {
     pose: PlanarSimilarity,
@@ -120,7 +121,8 @@ impl Found {
 /// Minimum size of the part at the swept level, in level pixels. Chosen by hand, not measured; the sweep's time
 /// grows with its fourth power.
 const SWEEP_EXTENT: f64 = 50.0;
-/// Edge points read at that level; every pose uses a sample of them. Chosen by hand, not measured.
+/// Maximum number of edge points read at the swept level; every pose uses a sample of them. Chosen by hand, not
+/// measured.
 const SWEEP_POINTS: usize = 128;
 /// Minimum number of edge points at a level; with fewer, the next finer level is swept. Chosen by hand, not measured.
 const MIN_SWEEP_POINTS: usize = 32;
@@ -136,17 +138,17 @@ const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
 /// to save time.
 const STARTS_AT_ONCE: usize = 64;
 const FOLLOWED_AT_ONCE: usize = 8;
-/// Further starts are followed as long as the agreement of one of the last is at least this. Chosen by hand, below
+/// Further starts are followed as long as at least one of the last eight has this agreement. Chosen by hand, below
 /// every right pose on generated parts except the lowest twentieth.
 const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Largest gain of agreement from the agreement's level to full resolution. On the tuned sets it is 0.06 at most for 99
 /// of 100 places; a place that would gain more is not lost, but placed less exactly.
 const MAX_GAIN: f64 = 0.1;
-/// Two places overlap for certain if they share this much more of the area than matches may: it is estimated from few
-/// points, and both still move by pixels. Chosen by hand.
+/// Two places overlap for certain if they share this much more of the area than matches may: the share is estimated
+/// from few points, and both places still move by pixels. Chosen by hand.
 const OVERLAP_MARGIN: f64 = 0.15;
-/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the largest ratio of their
-/// responses. Chosen by hand to save time: of ten photographed clips in a picture all are found.
+/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the smallest ratio of a
+/// response to the best one. Chosen by hand to save time: of ten photographed clips in a picture all are found.
 const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
@@ -155,8 +157,8 @@ const MIN_RESPONSE: f64 = 0.2;
 /// the distance of the next start. Derived from that, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
-/// Maximum number of matches below certain agreement that are refined again: of those that may be a part, and in total.
-/// Chosen by hand, not measured: more take more time.
+/// Largest and smallest number of matches below `sure_agreement` that are refined again. Between these limits, all that
+/// may be a part are refined. Chosen by hand, not measured: more take more time.
 const MAX_NUM_POLISHED: usize = 16;
 const MIN_NUM_POLISHED: usize = 3;
 /// Largest share of the part's area that two matches may share. Chosen by hand, not measured.
@@ -193,8 +195,8 @@ impl ShapeSearch {
     /// `outline` is in pixels of `image`, as for [`ShapeTemplate::new`].
     ///
     /// # Errors
-    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2, a minimum agreement
-    /// outside 0 to 1 and fewer than 8 or more than 1024 points.
+    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2 or in descending order, a
+    /// minimum agreement outside 0 to 1, a number of points outside 8 to 1024, or a number of starts outside 8 to 4096.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &SearchConfig) -> Result<Self, ShapeError> {
         check_config(config)?;
         let template = ShapeTemplate::new(image, outline, &config.shape)?;
@@ -221,7 +223,7 @@ impl ShapeSearch {
             likeness: Likeness::new(image, outline),
             details: Details::new(image, outline),
             turned: if profile.is_some() { None } else { Some(turned()) },
-            // The difference from the mirror image is the light on one side of the axis.
+            // A part of revolution differs from its mirror image only by the light on one side of the axis.
             mirrored: if profile.is_some() { None } else { mirrored() },
             profile,
             close_up,
@@ -234,7 +236,7 @@ impl ShapeSearch {
 
     /// Finds the part anywhere in `image`, best match first; empty if there is none.
     ///
-    /// Several parts may lie there, at any turn; deterministic.
+    /// The image may show several parts, at any angle. Deterministic.
     pub fn search(&self, image: &RgbImage) -> Vec<Match> {
         let field = GradientField::with_config(image, &self.config.shape.gradient);
         self.search_picture(&Picture { image, field: &field, table: &TableColors::new(image) })
@@ -264,8 +266,8 @@ impl ShapeSearch {
         matches
     }
 
-    /// Follows starts, the best first. Once parts are found, it follows further starts that resemble theirs; without a
-    /// part, no more.
+    /// Follows starts, the best first. If that finds parts, it also follows further starts that resemble the starts of
+    /// these parts; otherwise it stops.
     fn follow_best(&self, picture: &Picture<'_>, mut starts: Vec<Start>) -> Vec<Found> {
         let mut climbed_before: Vec<Pose> = Vec::new();
         let mut all = Vec::new();
@@ -356,11 +358,12 @@ impl ShapeSearch {
         self.profile.as_ref().map(|profile| &profile.revolution)
     }
 
-    /// The share of `shift`, in `[0, 1]`, between the outline of a part of revolution and the pose that all edges agree
-    /// on; 0 for other parts. Edges on its upper side, which are higher than its outline, hold the pose there.
+    /// The share of `shift`, in `[0, 1]`, by which `pose` moves until the outline of a part of revolution agrees best;
+    /// 0 for other parts. Edges on the upper side, which are higher than the outline, may keep `pose` beside the
+    /// outline.
     ///
     /// # Units and frames
-    /// `shift` is in pixels of the picture that `field` is of.
+    /// `shift` is in pixels of the picture from which `field` was computed.
     pub fn outline_beside(&self, field: &GradientField, pose: &PlanarSimilarity, shift: Vector2<f64>) -> f64 {
         self.profile.as_ref().map_or(0.0, |profile| profile.share_of(field, pose, shift))
     }
@@ -384,7 +387,7 @@ impl ShapeSearch {
         }
     }
 
-    /// Refined from all directions where a match is poor: its start may have been on the wrong side of a shadow.
+    /// Refines poor matches from all directions: the start may have been on the wrong side of a shadow.
     fn polish(&self, picture: &Picture<'_>, found: Vec<Found>) -> Vec<Found> {
         let sure = self.config.shape.refinement.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
@@ -409,7 +412,7 @@ impl ShapeSearch {
         if is_in_range && refined.agreement > found.agreement { refined } else { *found }
     }
 
-    /// Best first; of matches that claim the same area, only the best.
+    /// Best first; of matches that cover the same area, only the best.
     fn apart(&self, mut found: Vec<Found>) -> Vec<Found> {
         found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
         let mut kept: Vec<Found> = Vec::new();
@@ -478,8 +481,9 @@ fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
     Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
 }
 
-/// The places in a photo, whose gradients are `photo`, where a part of about its size may lie, wholly or partly: other
-/// places of the part itself, or of its mirror image. `points` are the part's at the swept level.
+/// The poses in a photo, whose gradients are `photo`, at which the photo resembles a part of about the same size,
+/// wholly or in some of its edges. That part is the taught one or its mirror image; `points` are its edge points at the
+/// swept level.
 fn places_in_photo(
     points: &[EdgePoint],
     level_idx: usize,

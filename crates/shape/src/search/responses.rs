@@ -1,15 +1,15 @@
 //! Look-up tables of one image: the agreement of each of a few quantised directions with each place.
 //!
-//! Legend: `k` one of [`NUM_DIRECTIONS`] directions, evenly spaced over half a turn since gradients have no sign; the
-//! response of direction `k` at pixel `(x, y)` of the pyramid level is the best of `cos 2(direction k − gradient
-//! direction)` over the pixels at most [`SPREAD`] away, from 0 to [`FULL`]. An edge point of the template whose normal
-//! is nearest to direction `k` reads its share of the agreement with one table access.
+//! Legend: `k` one of [`NUM_DIRECTIONS`] directions, evenly spaced over 180°, since gradients have no sign; the
+//! response of direction `k` at pixel `(x, y)` of the pyramid level is the best of
+//! `cos 2(direction k − gradient direction)` over the pixels at most [`SPREAD`] away, from 0 to [`FULL`]. An edge point
+//! of the template whose normal is nearest to direction `k` reads its share of the agreement with one table access.
 //!
 //! The part's centre is tried at places that are [`PITCH`] pixels apart. Pixels are therefore kept in one table for
 //! each remainder of x and y, so that neighbouring places read neighbouring bytes.
 //!
-//! Spreading allows a step between places and turns that is wider than an edge, and directions are still read where
-//! a thin part shows both its edges.
+//! Spreading allows a step between places and angles that is wider than an edge, and directions are still read where a
+//! thin part shows both its edges.
 //!
 //! # Source
 //! The idea of spread directions, response maps and their order in memory is LINE-2D's (Hinterstoisser et al.,
@@ -24,8 +24,8 @@ use crate::gradient_field::{GradientLevel, whole};
 use crate::lanes::in_lanes;
 use crate::parallel;
 
-/// Directions over half a turn; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived
-/// from that loss and from the number of tables, which must fit in a byte.
+/// Directions over 180°; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived from that loss and
+/// from the number of tables, which must fit in a byte.
 pub(crate) const NUM_DIRECTIONS: usize = 16;
 /// Response of an edge of exactly the table's direction. Small, so that 16 of them add up within a byte. Derived: 17 × 15 is 255.
 pub(crate) const FULL: u8 = 15;
@@ -202,7 +202,7 @@ struct Raise<'a> {
 impl WithSimd for Raise<'_> {
     type Output = ();
 
-    /// As there.
+    /// As in [`Responded`].
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for (value, &other) in self.values.iter_mut().zip(self.to) {

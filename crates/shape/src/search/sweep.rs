@@ -4,9 +4,10 @@
 //! tables ─ per stretch of places, per variant: add a shifted table row per point ─ best variant of each place and group
 //!        ─ local maxima ─ starts, the best of each scale in turn
 //! ```
-//! A group is one scale within one quarter of the turn, and a place keeps the best variant of each group. A part that
-//! is similar after half a turn therefore keeps both turns, and the finer levels decide. The same holds for a part in
-//! clutter or noise, where the smallest scale agrees best almost everywhere because its points are closest together.
+//! A group is one scale within a range of angles of 90°, and a place keeps the best variant of each group. A part that
+//! is similar after a rotation by 180° therefore keeps both angles, and the finer levels decide. The same holds for a
+//! part in clutter or noise, where the smallest scale agrees best almost everywhere because its points are closest
+//! together.
 
 use pulp::{Simd, WithSimd};
 
@@ -19,8 +20,8 @@ use crate::search::responses::{BLOCK, FULL, Responses};
 const STRETCH: usize = 1024;
 /// Reads summed in bytes before they are carried into 16 bits. Derived.
 const READS_PER_BYTE: usize = 255 / FULL as usize;
-/// Sectors of the turn, each with its own best of every scale. Two would be enough for half a turn; four were chosen by
-/// hand, not measured.
+/// Number of ranges of angles, each with its own best variant of every scale. Two would be enough for parts that are
+/// similar after 180°; four were chosen by hand, not measured.
 const NUM_SECTORS: usize = 4;
 /// A start is the maximum within this many places. Chosen by hand, not measured.
 const PEAK_RADIUS: usize = 2;
@@ -83,7 +84,7 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
 /// The variants that compete with each other at a place.
 struct Groups {
     count: usize,
-    /// Of every variant.
+    /// The group of every variant.
     idxs: Vec<usize>,
 }
 
@@ -103,7 +104,7 @@ struct PeakField {
 }
 
 impl PeakField {
-    /// `sums` from an offset relative to the first place.
+    /// `sums_from` returns the sums from an offset on, relative to the first place.
     fn new<'a>(responses: &Responses, sums_from: impl Fn(usize) -> &'a [i16]) -> Self {
         let (width, height) = (responses.width, responses.height);
         let stride = width + 2 * PEAK_RADIUS;

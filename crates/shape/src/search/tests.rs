@@ -19,10 +19,11 @@ fn only_a_place_under_a_clearly_better_one_cannot_match() {
     let found = |right: f64, agreement: f64| Found { pose: PlanarSimilarity::translation(right, 0.0), agreement };
     let cannot = |rough: &Found, other: Found| search.cannot_match(rough, [other].iter());
     let rough = found(0.0, 0.5);
-    // 20 of its 100 pixels aside, then 70.
+    // Shifted by 20 of the plate's 100 pixels, then by 70.
     assert!(cannot(&rough, found(20.0, 0.7)) && !cannot(&rough, found(70.0, 0.7)));
     assert!(!cannot(&rough, found(20.0, 0.55)) && !cannot(&rough, rough));
-    // Alone it cannot if it would have to gain more than any place does to be refined or listed.
+    // Without another place it cannot match if, to be listed or refined, it would have to gain more than any place
+    // does.
     assert!(!search.cannot_match(&found(0.0, 0.2), [].iter()) && search.cannot_match(&found(0.0, 0.1), [].iter()));
 }
 

@@ -19,7 +19,7 @@ pub const HEIGHT: u32 = 480;
 pub enum Solid {
     /// A round bar from `a` to `b`.
     Bar { a: [f64; 2], b: [f64; 2], radius: f64 },
-    /// A plate with upright sides, turned by `angle`.
+    /// A plate with upright sides, rotated by `angle`.
     Plate { center: [f64; 2], half: [f64; 2], angle: f64, height: f64 },
     /// An upright cylinder.
     Disc { center: [f64; 2], radius: f64, height: f64 },
@@ -300,7 +300,7 @@ impl Scene {
         RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
             let color = colors[y as usize * width + x as usize];
             Rgb(color.map(|v| {
-                // The sum of three uniform numbers is normal enough.
+                // The sum of three uniform numbers is close enough to a normal distribution.
                 let noise: f64 = (0..3).map(|_| rng.random_range(-1.0..1.0)).sum::<f64>() * self.noise;
                 (v * 235.0 + noise).round().clamp(0.0, 255.0) as u8
             }))
@@ -461,7 +461,7 @@ pub fn outline(part: &Part, image_from_part: &PlanarSimilarity) -> Polygon {
     let (mut at, mut heading) = (start, 0usize);
     loop {
         vertices.push(Point2::new(0.5 * f64::from(at.0) + 0.25, 0.5 * f64::from(at.1) + 0.25));
-        // Moore tracing: turn left from the previous direction until the part is met.
+        // Moore tracing: rotate to the right, from 90° left of the previous direction, until the part is met.
         let next = (0..8).map(|k| (heading + 6 + k) % 8).find(|&d| inside(at.0 + AROUND[d].0, at.1 + AROUND[d].1));
         let Some(direction) = next else { break };
         at = (at.0 + AROUND[direction].0, at.1 + AROUND[direction].1);
@@ -474,7 +474,7 @@ pub fn outline(part: &Part, image_from_part: &PlanarSimilarity) -> Polygon {
     Polygon { vertices }
 }
 
-/// Turn, scale and shift of the demonstration that puts the part at `image_from_part`.
+/// The pose of the demonstration for a part at `image_from_part`.
 pub fn truth(image_from_part: &PlanarSimilarity, demonstration_from_part: &PlanarSimilarity) -> PlanarSimilarity {
     image_from_part.compose(&demonstration_from_part.inverse())
 }
