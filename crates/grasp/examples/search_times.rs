@@ -13,8 +13,9 @@ use sdg_grasp::{GraspModel, SearchRegion, Verification};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let model_path =
-        arguments.next().ok_or("usage: search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] PICTURE…")?;
+    let model_path = arguments
+        .next()
+        .ok_or("usage: search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] [--region X,Y,W,H] PICTURE…")?;
     let mut model = GraspModel::from_bytes(&std::fs::read(model_path)?, &Device::flex())?;
     let (mut repeats, mut paths) = (15, Vec::new());
     while let Some(argument) = arguments.next() {

@@ -13,10 +13,10 @@ pub enum ShapeError {
     },
     /// The outline and the image overlap too little.
     #[error(
-        "expected an outline at least {expected_px} px wide and high inside the {width}x{height} image, found {found_width_px:.1} x {found_height_px:.1} px"
+        "expected an outline at least {expected_px} px long inside the {width}x{height} image, found {found_width_px:.1} x {found_height_px:.1} px"
     )]
     OutlineTooSmall {
-        /// Smallest extent accepted, in pixels.
+        /// Minimum length of the longer side of its box, in pixels.
         expected_px: f64,
         width: u32,
         height: u32,

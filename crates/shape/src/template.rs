@@ -12,7 +12,7 @@ use crate::gradient_field::{GradientField, GradientLevel};
 use crate::pose::{LevelMap, Pose};
 use crate::sightings::FIRST_REACH;
 
-/// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
+/// Minimum length of the longer side of an outline's box, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
 /// Smallest extent of the part at the finest level (a smaller part is read at full resolution) and at the coarsest, in
 /// level pixels; the extent is less than twice as large. Chosen by hand, not measured.
@@ -211,7 +211,7 @@ fn checked_outline(image: &RgbImage, outline: &Polygon) -> Result<Polygon, Shape
         return Err(ShapeError::OutlineDegenerate { found: format!("a vertex at ({}, {})", v.x, v.y) });
     }
     let inside = outline.bounds().clip(f64::from(image.width()), f64::from(image.height()));
-    if inside.width() < MIN_EXTENT_PX || inside.height().max(inside.width()) < MIN_EXTENT_PX {
+    if inside.width().max(inside.height()) < MIN_EXTENT_PX {
         return Err(ShapeError::OutlineTooSmall {
             expected_px: MIN_EXTENT_PX,
             width: image.width(),

@@ -178,6 +178,12 @@ fn a_tiny_part_is_found_and_a_smaller_one_refused() {
     assert!((center - nalgebra::Point2::new(28.0, 89.0)).norm() < 0.5, "{center}");
     let refused = ShapeSearch::new(&dot(70, 50, 6), &outline(70.0, 50.0, 6.0), &SearchConfig::default());
     assert!(matches!(refused, Err(ShapeError::OutlineTooSmall { .. })));
+    // A thin part is accepted upright and lying.
+    let thin = |w: f64, h: f64| Polygon::from_box(&BoundingBox { x1: 10.0, y1: 10.0, x2: 10.0 + w, y2: 10.0 + h });
+    for outline in [thin(6.0, 60.0), thin(60.0, 6.0)] {
+        let made = ShapeSearch::new(&dot(10, 10, 60), &outline, &SearchConfig::default());
+        assert!(!matches!(made, Err(ShapeError::OutlineTooSmall { .. })));
+    }
 }
 
 #[test]

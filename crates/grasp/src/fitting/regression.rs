@@ -259,8 +259,9 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
         term.neutral = match k {
             0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
             6 => median(k, None),
-            // The other terms are neutral up to the start of their range.
-            8.. => term.range[0],
+            // `details` counts against a part only, below the end of its range; the others from the start of theirs.
+            8 => term.range[1],
+            9.. => term.range[0],
             _ => 0.0,
         };
         term.neutral = (term.neutral * 100.0).round() / 100.0;

@@ -86,7 +86,7 @@ impl HeldBack<'_> {
     ) -> Result<Calibrated> {
         /// Assumed highest raw score of a wrong detection if the held-out samples gave none. Chosen by hand, not
         /// measured.
-        const LOG_ODDS_WITHOUT_WRONG: f64 = 0.1;
+        const RAW_SCORE_WITHOUT_WRONG: f64 = 0.1;
         let samples: Vec<(&Sample, &Proposals)> = self.samples.iter().zip(proposals).collect();
         let seen = side_by_side(&samples, |(sample, proposals)| Ok(self.measure(sample, proposals, demonstrations)))?;
         let scores = |score: fn(&Seen) -> Option<f64>| seen.iter().filter_map(score).collect::<Vec<_>>();
@@ -98,7 +98,7 @@ impl HeldBack<'_> {
         Ok(Calibrated {
             positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
-            network: NetworkCalibration::fit(&right_scores, &wrong_scores, LOG_ODDS_WITHOUT_WRONG, usual_threshold)
+            network: NetworkCalibration::fit(&right_scores, &wrong_scores, RAW_SCORE_WITHOUT_WRONG, usual_threshold)
                 .unwrap_or(NetworkCalibration::NEUTRAL),
             on_part,
             elsewhere,
