@@ -155,6 +155,7 @@ impl TrajectoryArm {
 
     /// Waits for the end of a motion of the hand, or for a reason to cancel it.
     fn hand_end(&self, mut goal: Goal, watch: &mut Watch) -> Result<(GoalEnd, GripperCommandResult)> {
+        watch.allow_silence(MAX_SILENCE_SECS);
         let deadline = Instant::now() + MAX_HAND;
         let mut seen_secs = f64::NAN;
         loop {
