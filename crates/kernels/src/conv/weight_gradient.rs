@@ -16,7 +16,7 @@ use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
 
-/// Maximum number of positions summed at a time, so that they are read repeatedly from a near cache.
+/// Approximate number of positions summed at a time, so that they are read repeatedly from a near cache.
 const BLOCK_POSITIONS: usize = 256;
 /// Minimum number of positions of a chunk.
 const CHUNK_POSITIONS: usize = 2048;
@@ -179,7 +179,7 @@ impl<'a> PaddedInput<'a> {
         Self { values: PaddedValues::Copied(values), height, width, channels, stride }
     }
 
-    /// The input of kernel row `kernel_y` from output row `y` of an image on, from column `first` of its run on.
+    /// The input of kernel row `kernel_y`, beginning with output row `y` of an image and column `first` of the run.
     fn rows(&self, image: usize, y: usize, kernel_y: usize, first: usize) -> Operand<'_> {
         let values: &[f32] = match &self.values {
             PaddedValues::InPlace(values) => values,
