@@ -21,7 +21,7 @@ pub type Facts = BTreeMap<String, f64>;
 /// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
-    /// Seconds per piece of the untimed run; `None` without such a run.
+    /// Seconds of the whole untimed run; `None` without such a run.
     pub seconds: Option<f64>,
     pub facts: Facts,
     /// Multiplications and additions in the network's products, in units of 1e9, if the worker counts them.
