@@ -50,7 +50,7 @@ pub struct Request {
 pub struct Work {
     pub run: Box<dyn FnMut() -> Result<()>>,
     pub facts: Facts,
-    /// Number of pieces that one run makes; times are reported per piece.
+    /// Number of pieces that one run makes; the answers to `repeat` are per piece.
     pub pieces: usize,
     /// Whether an untimed run goes first.
     pub warm_up: bool,

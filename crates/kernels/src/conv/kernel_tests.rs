@@ -180,7 +180,7 @@ proptest! {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let isa = Isa::detect();
-    // Large maps, and small maps whose filters are distributed.
+    // Large maps, and small maps whose filters are divided among the threads.
     for x in [[2, 12, 50, 70], [3, 40, 6, 5], [2, 16, 70, 70], [1, 96, 9, 9]] {
         for stride in [1, 2] {
             let case = ConvCase { x, out_channels: 48, kernel: [3, 3], params: Conv2dParams::square(stride, 1) };

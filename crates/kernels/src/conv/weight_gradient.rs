@@ -2,9 +2,9 @@
 //!
 //! `grad[m, ky, kx, c] = Σ_p output_grad[p, m] · x[position(p)·stride + (ky, kx) − padding, c]`
 //!
-//! Maps are channels last, so that the values that a kernel row ky needs at a position are one run of Kw·C floats,
-//! and the next position's run starts stride·C later: rows of the product are output channels, columns run along
-//! (kx, c), and its depth is the positions, all read in place (x after zeros were added around it, if it is padded).
+//! Maps are channels last, so the values that a kernel row ky needs at a position are one run of Kw·C floats, and the
+//! next position's run starts stride·C later. The product has output channels as rows, (kx, c) as columns, and
+//! positions as depth. It reads everything in place; only a padded x is first copied with zeros around it.
 //!
 //! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 
