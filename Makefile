@@ -1,7 +1,7 @@
 # `make demo` and `make test` are all that a new user needs; both install what is missing and build once.
 
 CARGO ?= cargo
-# One profile for tests and runs: a fresh machine compiles burn once.
+# One profile for tests and runs, so a fresh machine compiles burn only once.
 PROFILE := --release
 
 .DEFAULT_GOAL := help
@@ -50,7 +50,7 @@ capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's
 test-c: wheel capi ## Tests the C library: programs in C and C++ under valgrind, the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
 	@scripts/c/test.sh $(PYTEST)
 
-# Without examples, which cargo would compile along: `make lint` checks those.
+# Without the examples, which cargo would compile too; `make lint` checks them.
 TESTS_ALONE = --lib --bins --tests
 
 test-compile: setup ## Compiles every test
@@ -60,7 +60,7 @@ test-compile: setup ## Compiles every test
 		$(CARGO) test $(PROFILE) --locked --workspace $(TESTS_ALONE) --no-run; \
 	fi
 
-# nextest where it is installed, cargo's own runner elsewhere; nextest leaves the examples in the docs to cargo.
+# Uses nextest if it is installed, otherwise cargo's own runner. nextest does not run the examples in the docs.
 test: setup ## Runs every test
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run $(PROFILE) --locked --workspace $(TESTS_ALONE); \
@@ -80,13 +80,13 @@ film: build ## Makes the pictures of the front page, the tour and the gallery, d
 	@scripts/install.sh chromium chromium-driver
 	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored film:: gallery::
 
-# A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 where the part looks the same after half a turn.
-walk: build ## From a photograph to a tried model with a stop-watch, through the page in Chromium (SETS="FOLDER …")
+# A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 if the part looks the same after half a turn.
+walk: build ## Times the way from a photo to a tried model, through the page in Chromium (SETS="FOLDER …")
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture walk::
 
-# Without TUNED=1 it is a look at the reported side, to be recorded in docs/decisions/025-acceptance.md.
+# A run without TUNED=1 looks at the reported side: record it in docs/decisions/025-acceptance.md.
 MODELS ?= S
 acceptance: build ## Teaches the sets of datasets/split.toml and counts both sides of the split (SETS=FOLDER, MODELS=S,C; TUNED=1: one side)
 	target/release/sdg evaluate --split datasets/split.toml --sets "$(or $(SETS),../shared)" --models $(MODELS) $(if $(TUNED),--tuned)
@@ -100,13 +100,13 @@ test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated 
 test-ros2: setup ## Tests ROS 2 against Cyclone DDS and Fast DDS on loopback (burn is compiled once more; TESTS=latency: one of them)
 	@scripts/test-ros2.sh
 
-test-slurm: build ## An evaluation as Slurm's job arrays beside the serial one: a node dies, the controller is restarted, a unit fails (root)
+test-slurm: build ## Compares an evaluation as Slurm's job arrays with the serial one: a node dies, the controller is restarted, a unit fails (root)
 	@scripts/test-slurm.sh
 
 slurm-image: build ## An OCI image of sdg by mmdebstrap and umoci, run without network where namespaces are allowed (root)
 	@scripts/slurm/image.sh
 
-# PROFILE=release is built in a quarter of the time, for trying.
+# PROFILE=release takes a quarter of the time, for trials.
 deb: setup ## A Debian package of sdg, in target/packages/deb (ARCH=arm64: for it; TRY=1: installed, used and removed in a clean root; root)
 	@ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/deb.sh
 
@@ -122,13 +122,13 @@ image: setup ## An OCI image for users, in target/packages/image, used without n
 windows: setup ## sdg.exe without simulator, as a zip in target/packages/windows (TRY=1: used under Wine)
 	@TRY="$(TRY)" scripts/packages/windows.sh
 
-release: setup ## All packages with checksums, lists of what is in them, and the check of the libraries' interfaces, in target/packages/release
+release: setup ## All packages with checksums, lists of their contents, and the check of the libraries' interfaces, in target/packages/release
 	@scripts/packages/release.sh
 
-hardening: setup ## Hostile input for every reader of strangers' files and messages, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
+hardening: setup ## Hostile input for every reader of files and messages from outside, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
 	@QUICK="$(QUICK)" SECTIONS="$(or $(SECTIONS),$(if $(COVERAGE),coverage))" EXECUTIONS="$(EXECUTIONS)" TARGETS="$(TARGETS)" SHOW="$(SHOW)" scripts/hardening/run.sh
 
-endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot told wrong (SECTION="crash soak", QUICK=1; root)
+endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot with wrong perception (SECTION="crash soak", QUICK=1; root)
 	@scripts/hardening/endure.sh $(SECTION)
 
 coverage: setup ## Lines and regions of robot, fci and kinematics that tests reach (FILES=1: the lines that none does)
@@ -137,13 +137,13 @@ coverage: setup ## Lines and regions of robot, fci and kinematics that tests rea
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
 
-network-grasps: setup ## Grasps of all parts over TCP and UDP beside the same in one process, in lockstep and in real time (NETWORK_GRASPS=5: fewer)
+network-grasps: setup ## Grasps of all parts over TCP and UDP, compared with the same in one process, in lockstep and in real time (NETWORK_GRASPS=5: fewer)
 	@scripts/network-grasps.sh
 
-placing: setup ## 20 parts into a tray, grasps from a table 5 mm higher than told, in one process and over TCP and UDP in lockstep
+placing: setup ## Places 20 parts in a tray and grasps from a table 5 mm higher than configured, in one process and over TCP and UDP in lockstep
 	@scripts/placing.sh
 
-heights: setup ## Grasps with no height told, from higher tables and from blocks: how exactly heights are measured, and how many hold (HEIGHTS=2 for fewer)
+heights: setup ## Grasps with unknown heights, from higher tables and from blocks: how exactly heights are measured, and how many hold (HEIGHTS=2 for fewer)
 	@scripts/heights.sh
 
 test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
@@ -157,21 +157,21 @@ test-ndarray: setup ## Tests ndarray against flex (ten minutes to compile, three
 	$(call DEVICE_TESTS,ndarray) --test cli -- devices::
 	$(call DEVICE_TESTS,ndarray) --lib -- device_parity
 
-# Any Python that has torchvision; without one, the peers' of `make bench` (0.9 GB to fetch, once).
+# Any Python with torchvision; the default is that of `make bench` (0.9 GB, downloaded once).
 SDG_TORCH_PYTHON ?= $(CURDIR)/target/bench/venv/bin/python
 
 test-torch: setup ## Tests a whole network against torchvision, losses and gradients included
 	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
 	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked --workspace --test detection -- --ignored golden::
 
-# The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
+# The libraries for other programs, and their dependencies. Nothing is published, or compiled again, because the tests compile the same code.
 PACKAGED = geometry picture kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
 
 package: ## Packages the libraries that other programs can use, into target/package
 	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
 
-# Every feature of every crate, so that what CI does not run compiles; then the program of small machines, which has none. CUDA's
-# build fetches LLVM unless it is told that only documents are made; a check does not need it.
+# With the features of all crates, so that code that CI does not run is compiled too; then the program for small machines, which has
+# none. CUDA's build downloads LLVM, which a check does not need, unless DOCS_RS is set.
 FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu,sdg-python/extension
 
 lint: setup ## Spelling, formatting and lints, with every feature, as CI denies them
@@ -183,10 +183,10 @@ lint: setup ## Spelling, formatting and lints, with every feature, as CI denies 
 deny: setup ## Licences and sources of all dependencies, and advisories where their database can be reached (ADVISORIES=FOLDER: a clone of it)
 	@ADVISORIES="$(ADVISORIES)" scripts/deny.sh
 
-# What is in target/base-weights is gone on with. DEVICE: flex, wgpu or cuda.
+# Checkpoints in target/base-weights are continued. DEVICE: flex, wgpu or cuda.
 DEVICE ?= flex
 BASE_WEIGHTS := target/base-weights
-base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on where it was stopped)
+base-weights: setup ## Pretrains preset edge on generated parts (hours; continues where it was stopped)
 	$(CARGO) build $(PROFILE) --locked --workspace --bin sdg-base-weights --features sdg-base-weights/$(DEVICE)
 	mkdir -p $(BASE_WEIGHTS)
 	target/release/sdg-base-weights pretrain --checkpoint $(BASE_WEIGHTS)/detector.safetensors --device $(DEVICE)
@@ -207,21 +207,21 @@ bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentation
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 	@$(MAKE) bench-search QUICK=$(findstring --quick,$(BENCH))
 
-# Without a folder of sets shipped parts are measured alone. Of the sets only those are opened that constants are or were fitted on.
+# Without a folder of sets, only shipped parts are measured. Of the sets, only those are opened to which constants are or were fitted.
 bench-search: setup ## Model S against corrmatch, OpenCV's matchTemplate and LINEMOD, and its curves of time (SETS=FOLDER; QUICK=1: shipped parts, nothing is written)
 	@scripts/build.sh --bin sdg-bench
 	benches/peers/install-matchers.sh target/bench/matchers
 	target/release/sdg-bench matchers $(if $(QUICK),--rounds 1,--sets "$(or $(SETS),../shared)" --results benches/RESULTS.md)
 	target/release/sdg-bench curves $(if $(QUICK),--secs 0.2,--results benches/RESULTS.md)
 
-# After `make bench`, which leaves PyTorch and a taught model; npm fetches onnxruntime-web.
+# Needs the taught model that `make bench` writes; npm downloads onnxruntime-web.
 bench-browser: web ## The page's speed against onnxruntime-web in headless Chromium
 	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	benches/browser/install.sh target/bench/onnxruntime-web
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
-# PyPI's ompl goes into target/plan-peers. A quarter of an hour on two cores.
+# Installs PyPI's ompl in target/plan-peers. Takes a quarter of an hour on two cores.
 bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks a second, and OMPL on the same model
 	$(CARGO) build $(PROFILE) --locked --workspace --example planning
 	target/release/examples/planning rate

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the missing Debian packages for the build and the simulator.
-# Uses sudo only if not root. Called by every make target; finishes in milliseconds if there is nothing to do.
+# Uses sudo only if not root. Called by every make target that builds; finishes in milliseconds if there is nothing to do.
 set -euo pipefail
 
 packages=(gcc libc6-dev libmujoco-dev libegl1 libgl1-mesa-dri)

@@ -40,7 +40,7 @@ fail() {
 }
 
 server=
-# Python in the background ignores the interrupt that ends our program.
+# The argument TERM ends Python, which ignores interrupts in the background; ours ends by an interrupt.
 stop_server() {
     [ -z "$server" ] || kill "-${1:-INT}" "$server" 2>/dev/null || true
     [ -z "$server" ] || wait "$server" 2>/dev/null || true
@@ -48,7 +48,7 @@ stop_server() {
 }
 trap "stop_server TERM" EXIT
 
-# The last argument is the address: each server has its own, so none waits for the ports of another server.
+# The first argument is the address: each server has its own, so none waits for the ports of another server.
 serve() {
     local address=$1
     shift

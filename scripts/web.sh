@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # Builds the browser's page into target/web: the WebAssembly modules (target/web/webgpu has the one for graphics cards), the
 # JavaScript that calls them, the page's own files. The result is a folder that any static host serves. Called by `make web`.
-#
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

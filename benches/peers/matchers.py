@@ -3,8 +3,8 @@
 in:   {"image": PATH}                                          a picture
 out:  {"seconds": s, "found": [[x, y, angle, score], ...]}     centre of the outline's box, pixels; degrees, clockwise
                                                                as seen, from the photo; best first
-The first message is {"ready": {"version": ..., "seconds": s}}, with the seconds for learning the photo. All matchers search the part at
-all angles and at the photo's size, because none of them supports other sizes.
+The first message is {"ready": {"version": ..., "seconds": s}}, with the seconds for learning the photo. All matchers search for the part
+at all angles and at the photo's size, because none of them supports other sizes.
 """
 
 import argparse
@@ -22,7 +22,7 @@ MOST_FOUND = 40
 
 
 class Part:
-    """The photo, rotated about the centre of the outline's box."""
+    """The photo, which `turned` rotates about the centre of the outline's box."""
 
     def __init__(self, photo, outline):
         self.photo, self.outline = photo, np.array(outline, np.float64)
@@ -60,7 +60,7 @@ def apart(found, distance):
 
 
 class MatchTemplate:
-    """Normalised correlation under the mask, first at a size of about 50 pixels, then at full size around the best positions."""
+    """Normalised correlation under the mask, first with a part of 50 to 100 pixels, then at full size around the best positions."""
 
     STEP, COARSE_PX, REFINED = 5, 50, 12
 
@@ -75,7 +75,7 @@ class MatchTemplate:
         if picture.shape[0] < template.shape[0] or picture.shape[1] < template.shape[1]:
             return None
         scores = cv2.matchTemplate(picture, template, cv2.TM_CCOEFF_NORMED, mask=mask)
-        # A patch of uniform grey has no correlation.
+        # The correlation with uniform grey is undefined.
         return np.where(np.isfinite(scores) & (scores <= 1.01), scores, -1)
 
     def find(self, picture):
@@ -148,7 +148,7 @@ class Linemod:
 
 
 class Corrmatch:
-    """corrmatch with the outline's box as rectangle, and as many levels as leave the template 12 pixels."""
+    """corrmatch with the outline's box as rectangle, and as many levels as leave the template at least 12 pixels."""
 
     LEAST_PX = 12
 
@@ -163,7 +163,7 @@ class Corrmatch:
         compiled = corrmatch.Template(template).compile(CompileConfig(max_levels=levels))
         config = MatchConfig(rotation="enabled", parallel=True, max_image_levels=levels, beam_width=20)
         self.matcher = compiled.matcher(config)
-        # The match is the upper left corner of the rectangle before its rotation about its centre.
+        # A match gives the upper left corner of the rectangle before its rotation about its centre.
         self.middle = np.array(template.shape[::-1]) / 2
 
     def find(self, picture):
@@ -171,7 +171,7 @@ class Corrmatch:
         try:
             matches = self.matcher.match_topk(gray, MOST_FOUND)
         except RuntimeError as error:
-            # The error means that nothing was found.
+            # This error means that nothing was found.
             print(error, file=sys.stderr)
             return []
         found = [(one.x + self.middle[0], one.y + self.middle[1], one.angle_deg, one.score) for one in matches]

@@ -2,7 +2,7 @@
 
 worker: {"ready": {"seconds": s, "facts": {...}, "gflop": g, "version": "..."}}    after one run that does not count
 driver: {"repeat": n}
-worker: {"seconds": s}                                                              n times
+worker: {"seconds": s}                                                              n times, of one piece
 The end of standard input ends the worker.
 """
 
@@ -19,12 +19,12 @@ class Work:
     """A computation to be timed."""
 
     run: Callable[[], None]
-    # The same work gives the same numbers, within 1 %.
+    # Numbers that show what was computed; peers with the same work agree within 1 %.
     facts: dict = field(default_factory=dict)
     # Multiplications and additions in the network's products, in units of 1e9; None if they were not counted.
     gflop: float | None = None
     version: str = ""
-    # Number of pieces that one run makes; times are reported per piece.
+    # Number of pieces that one run makes; the answers to `repeat` are per piece.
     pieces: int = 1
 
 

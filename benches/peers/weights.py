@@ -29,7 +29,7 @@ TORCHVISION = [
 
 
 def read(path, module=""):
-    """Reads the arrays of a safetensors file of floats by our names; of a grasp model, only those of one module."""
+    """Reads the arrays of a safetensors file of floats by name: those under `module`, without this prefix."""
     with open(path, "rb") as file:
         header = json.loads(file.read(int.from_bytes(file.read(8), "little")))
         data = file.read()

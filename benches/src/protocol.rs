@@ -21,7 +21,7 @@ pub type Facts = BTreeMap<String, f64>;
 /// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
-    /// Seconds per piece of the untimed run; `None` without such a run.
+    /// Seconds of the whole untimed run; `None` without such a run.
     pub seconds: Option<f64>,
     pub facts: Facts,
     /// Multiplications and additions in the network's products, in units of 1e9, if the worker counts them.
@@ -50,7 +50,7 @@ pub struct Request {
 pub struct Work {
     pub run: Box<dyn FnMut() -> Result<()>>,
     pub facts: Facts,
-    /// Number of pieces that one run makes; times are reported per piece.
+    /// Number of pieces that one run makes; the answers to `repeat` are per piece.
     pub pieces: usize,
     /// Whether an untimed run goes first.
     pub warm_up: bool,

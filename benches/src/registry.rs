@@ -22,7 +22,7 @@ pub struct WorkSpec {
     pub network: Option<Network>,
     /// The peers; empty if only our own time is measured.
     pub peers: &'static [Peer],
-    /// Whether the work takes minutes: it runs once, and not with `--quick`.
+    /// Whether the work takes minutes: it runs once, and with `--quick` only if `--only` names it.
     pub long: bool,
     /// Whether the work reads the grasp model that `teaching` writes.
     pub needs_model: bool,
@@ -46,7 +46,7 @@ const fn compared(
     WorkSpec { name, title, network, peers, long: false, needs_model: false }
 }
 
-/// Our own matrix product; the highest speed of all sides is the machine's peak.
+/// A matrix product; the highest speed of all sides is taken as the machine's peak.
 pub const GEMM: WorkSpec = compared("gemm", "product of two 2048×2048 matrices", None, &[also("pytorch", "PyTorch")]);
 
 const TORCHVISION: &[Peer] = &[peer("pytorch", "torchvision", 2.0)];

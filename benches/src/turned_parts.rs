@@ -65,8 +65,7 @@ fn outline(photo: &Demonstration) -> Polygon {
     photo.annotation.outline.clone().unwrap_or_else(|| Polygon::from_box(&photo.annotation.bbox))
 }
 
-/// `count` poses on a grid over a picture of this size, with the size of the photo. Each has a different angle and is
-/// at least the part's length away from the border.
+/// `count` poses at scale 1 on a grid over a picture of this size, each with a different angle.
 pub fn poses(
     photo: &Demonstration,
     [width, height]: [u32; 2],

@@ -46,7 +46,7 @@ impl Measurements {
     /// Reads the text of the file.
     ///
     /// # Errors
-    /// It is not such a file, or a measurement names an unknown part.
+    /// The text is not such a file, or a measurement names an unknown part or an unknown later program.
     pub fn read(text: &str) -> Result<Self, String> {
         let all: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         for (name, measurement) in &all.measured {

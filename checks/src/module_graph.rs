@@ -7,7 +7,7 @@ use std::{fs, io};
 use crate::paths::{mentions, named_paths};
 use crate::source_text::{code_of, modules_for_tests};
 
-/// A module's path from the crate's root, which is empty.
+/// A module's path from the crate's root; the root's own path is empty.
 type ModulePath = Vec<String>;
 
 /// The files of one crate and their imports, without files compiled only for tests. A module's `pub use` of its own

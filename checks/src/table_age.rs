@@ -87,8 +87,8 @@ fn fault(table: &Table, measurement: &Measurement, age: &Age) -> Option<String> 
     }
 }
 
-/// For each place where a text names a commit: the text after it, up to the next commit. Commits with nothing but "and"
-/// or a comma between them have the same note.
+/// For each mention of a commit in a text: the text after it, up to the next commit. Commits with nothing but "and" or
+/// a comma between them have the same note.
 fn notes_on<'a>(text: &'a str, commit: &str) -> Vec<&'a str> {
     let hashes = hashes(text);
     let mut notes = Vec::new();
@@ -110,8 +110,8 @@ fn notes_on<'a>(text: &'a str, commit: &str) -> Vec<&'a str> {
     notes
 }
 
-/// The words of a text that may be hashes of commits, with their places: hexadecimal, from seven digits on, with a digit
-/// and a letter.
+/// The words of a text that may be hashes of commits, with their start and end: hexadecimal, from seven digits on, with
+/// a digit and a letter.
 fn hashes(text: &str) -> Vec<(usize, usize, &str)> {
     let (mut found, mut start) = (Vec::new(), 0);
     let is_end = |c: char| !c.is_ascii_alphanumeric();

@@ -41,7 +41,8 @@ struct Section {
 /// The tables of a document, in order.
 pub fn tables(document: &str) -> Vec<Table> {
     let mut sections = vec![Section::default()];
-    // Sections by index, with the parents of each table's section: its paragraphs are complete at the end only.
+    // Indices of the current section and its parents. A section's paragraphs are complete only at the end, so each
+    // table keeps these indices.
     let mut open = vec![0_usize];
     let mut found: Vec<(Table, Vec<usize>)> = Vec::new();
     let mut is_in_table = false;
@@ -117,7 +118,8 @@ fn has_figures<'a>(rows: impl Iterator<Item = &'a &'a str>) -> bool {
     2 * numbers > cells
 }
 
-/// Any other comment is none: programs mark with `<!-- measured: begin -->` the place that they write.
+/// The mark in a line; `None` for any other comment. Programs enclose the text that they write in `<!-- measured: begin
+/// -->` and `<!-- measured: end -->`.
 fn mark_of(line: &str) -> Option<Mark> {
     let text = line.trim().strip_prefix("<!--")?.strip_suffix("-->")?.trim();
     if let Some(reason) = text.strip_prefix("not measured:") {

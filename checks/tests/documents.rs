@@ -29,7 +29,7 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
 }
 
-/// The tracked files that match a pattern, as paths from the root.
+/// The files that match a pattern, tracked or new and not ignored by git, as paths from the root.
 pub fn tracked(pattern: &str) -> Vec<String> {
     let output = Command::new("git")
         .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", pattern])

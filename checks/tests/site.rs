@@ -42,7 +42,7 @@ fn pages() -> BTreeMap<String, String> {
     pages
 }
 
-/// The values of an attribute, each with the text of its element before it.
+/// The values of an attribute, each with the text of its element before the attribute.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<(&'a str, &'a str)> {
     let start = format!(" {name}=\"");
     let mut found = Vec::new();

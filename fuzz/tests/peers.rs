@@ -20,8 +20,8 @@ use sdg_fuzz::make_mistakes;
 
 const NUM_SESSIONS: usize = 150;
 const TIMEOUT: Duration = Duration::from_millis(50);
-/// Covers two connections (versions 5 and 10), and the start, end and stop of a motion. Each wait has a limit; recovery
-/// has the longest one, which a closed connection shortens.
+/// Covers a connection, and the start, end and stop of a motion. Each wait has a limit; recovery has the longest one,
+/// which a closed connection shortens.
 const MAX_SESSION: Duration = Duration::from_secs(25);
 
 /// Mutates half of the messages.

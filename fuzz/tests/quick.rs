@@ -1,4 +1,4 @@
-//! A few thousand executions of every target. They are one test, because it counts the memory of the
+//! The short run of every target: 300 to 100 000 executions. All runs are one test, because it counts the memory of the
 //! whole process.
 #![allow(clippy::unwrap_used)]
 
@@ -42,7 +42,7 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
             wrong.push(format!("{}: {} of {} accepted", target.name, outcome.accepted, outcome.count));
         }
     }
-    // No mistake produces these pickles, which repeat an operation a million times.
+    // No mistake produces these pickles, which repeat one operation for a million bytes.
     let checkpoint = TARGETS.iter().find(|target| target.name == "checkpoint").unwrap();
     for (k, pickle) in costliest_pickles().iter().enumerate() {
         // The program reads the file from the disk, so the limit is 3 instead of

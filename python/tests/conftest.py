@@ -9,7 +9,7 @@ import made_pictures
 import sdg
 
 ROOT = Path(__file__).resolve().parents[2]
-# Heights of the pendulum's marks and grasp above the table: datasets/objects/pendulum.
+# Height of the pendulum's marks above the table: datasets/objects/pendulum.
 MARK_HEIGHT_MM = 16.0
 # Enough steps to show that C's network is used; the quality of its training is tested in Rust.
 STEPS = 10

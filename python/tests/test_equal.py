@@ -39,7 +39,7 @@ def output(*arguments: object) -> list[str]:
 
 
 def as_printed(value: Any) -> Any:
-    """Rounded to six digits after each point like the program: half away from zero."""
+    """Rounds numbers to six decimals like the program: half away from zero."""
     if isinstance(value, float):
         return math.copysign(math.floor(abs(value) * 1e6 + 0.5) / 1e6, value) + 0.0
     if isinstance(value, list):
@@ -63,7 +63,7 @@ def test_python_equals_rust_and_the_program(
         rust = json.loads(line)
         assert len(rust) == len(records), picture
         for one, other in zip(rust, records):
-            # Only the program gives `size`. Both are parsed from the shortest text that represents the number exactly.
+            # The reference has no `size`. Both are parsed from the shortest text that represents the number exactly.
             assert one == {key: value for key, value in other.items() if key != "size"}, picture
 
     options = ["--camera", made_pictures.CAMERA] if camera else []

@@ -24,7 +24,7 @@ case $package in
         installed=$(echo "$root"/opt/*/)
         ;;
 esac
-# A home folder that cannot be written, and a folder with a space and an umlaut.
+# A home folder that does not exist, and a folder with a space and an umlaut.
 folder="$root/tmp/erste Größe"
 mkdir -p "$folder"
 chmod 755 "$root"

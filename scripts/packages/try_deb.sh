@@ -16,7 +16,7 @@ inside() { unshare --mount --net --pid --fork chroot "$root" "$@"; }
 files >"$root.before"
 start=$(date +%s.%N)
 inside dpkg --install /sdg.deb >/dev/null
-# A home folder that cannot be written, and a folder with a space and an umlaut.
+# A home folder that does not exist, and a folder with a space and an umlaut.
 inside bash -euc 'mkdir -p "/tmp/erste Größe"; chown nobody "/tmp/erste Größe"'
 inside setpriv --reuid nobody --regid nogroup --clear-groups env HOME=/nonexistent \
     sh /first_grasp.sh sdg /usr/share/single-demo-grasp "/tmp/erste Größe" 2>&1 | tail -2

@@ -1,7 +1,8 @@
 //! The network to fill: its parameters and their shapes.
 //!
-//! Plain numbers, so that names and shapes are known without building the network (and without burn). The owner of
-//! the detector's configuration converts it, as `sdg weights` does; a test there compares it with a built detector.
+//! Plain numbers, so that names and shapes are known without building the network (and without burn). Crate `inputs`
+//! converts a detector's configuration to an [`Architecture`]; a test there compares the parameters with those of a
+//! built detector.
 
 use std::collections::BTreeMap;
 

@@ -145,8 +145,8 @@ impl Checkpoint {
             self.not_tensors.iter().take(SHOWN).map(|name| format!("`{}`", printable(name))).collect();
         let more = if self.not_tensors.len() > SHOWN { ", …" } else { "" };
         let what = format!("none, but {}{more}", named.join(", "));
-        // Names with a point are parameters. Their values are in torch's zip beside this pickle; Python's own pickle
-        // does not write them. Names without a point are the parts of a training checkpoint, one of which contains the
+        // Names with a dot are parameters. Their values are in torch's zip beside this pickle; Python's own pickle does
+        // not write them. Names without a dot are the parts of a training checkpoint, one of which contains the
         // weights, or their mean over the last steps (`model_ema`).
         match self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first()) {
             Some(name) if !name.contains('.') => format!(

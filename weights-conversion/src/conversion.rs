@@ -25,7 +25,7 @@ pub(crate) enum Origin {
     Tensor(StoredTensor),
     /// Rows of a tensor in another order; `None` for a row of zeros.
     Rows(StoredTensor, Vec<Option<usize>>),
-    /// A tensor that the file omits because all its values are this one.
+    /// One value for all elements of a parameter that the file omits.
     Constant(f32),
 }
 
@@ -51,7 +51,7 @@ impl Conversion {
     ///
     /// # Errors
     /// Names of an unknown scheme; a part to re-initialise that the network lacks. A backbone alone for a detector as
-    /// target is not an error: only its part is filled.
+    /// target is not an error: only the backbone is filled.
     pub fn plan(checkpoint: &Checkpoint, target: &Architecture, reinitialized: &[String]) -> Result<Self> {
         let naming = naming_of(checkpoint)?;
         let mut expected = target.parameters();
@@ -210,8 +210,8 @@ fn stands_for_missing(naming: Naming, name: &str) -> Option<f32> {
     }
 }
 
-/// The values of a parameter from a tensor: class rows are moved to the target's position of the class; all other
-/// shapes must be equal. `None` if the tensor does not fit.
+/// The values of a parameter from a tensor: rows of classes are moved to the target's order of classes; the shapes of
+/// all other parameters must be equal. `None` if the tensor does not fit.
 fn arrange(
     name: &str,
     tensor: &StoredTensor,

@@ -36,7 +36,7 @@ pub(crate) fn strip_wrapper(name: &str) -> &str {
 pub(crate) enum Renamed {
     /// A parameter of this project's network.
     To(String),
-    /// Known but not needed: it follows from the configuration.
+    /// Known but not needed, such as an anchor or a counter.
     NotNeeded,
     /// No parameter of this project's network corresponds to it.
     Unknown,

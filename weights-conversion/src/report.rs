@@ -48,11 +48,11 @@ pub struct Report {
     pub reinitialized: Vec<String>,
     /// Parameters without a tensor.
     pub missing: Vec<String>,
-    /// Parameters whose tensor has another shape.
+    /// Parameters whose tensor has another shape or type.
     pub mismatched: Vec<Mismatch>,
     /// Tensors that no parameter uses.
     pub unused: Vec<String>,
-    /// Entries that follow from the configuration, such as anchors.
+    /// Entries that the network does not need, such as anchors, counters and values that are not tensors.
     pub not_needed: Vec<String>,
 }
 

@@ -207,7 +207,7 @@ impl StoredTensor {
         Err(WeightsError::damaged("a tensor", expected, found.to_string()))
     }
 
-    /// Walks the axes like an odometer, the last one fastest.
+    /// Passes the values row by row, the last axis fastest.
     fn gather(&self, stored: &[f32], mut take: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
         let Some((&inner_size, outer_shape)) = self.shape.split_last() else {
             return take(&stored[..1]);

@@ -33,7 +33,7 @@ pub const WEIGHTS_VERSION: &str = "1";
 /// Element type of matrices and kernels in the written file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Precision {
-    /// The source's precision.
+    /// Single precision.
     F32,
     /// Half the size.
     F16,

@@ -125,7 +125,7 @@ impl ZipArchive {
     /// Reads the list of entries.
     ///
     /// # Errors
-    /// A truncated or altered archive; names that lead out of a folder; entries that overlap.
+    /// A truncated or altered archive; names that lead out of a folder; entries that are together larger than the file.
     pub fn read(source: &mut Source) -> Result<Self> {
         let (count, directory) = find_directory(source)?;
         if count > MAX_ENTRIES || directory.len > MAX_DIRECTORY_BYTES {

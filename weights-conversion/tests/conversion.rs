@@ -13,7 +13,7 @@ fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
-/// The architecture of the two fixtures, an eighth of ../shared/golden/detectron2's width.
+/// The architecture of the two fixtures, an eighth of the width of those in tests/golden/detectron2.
 fn narrow(num_classes: usize) -> Architecture {
     Architecture {
         backbone: Backbone {

@@ -13,7 +13,8 @@ use crate::compare::prepare::{Files, Paths};
 use crate::protocol::{Answer, Ready, Request};
 use crate::registry::{Side, WorkSpec};
 
-/// Pause between runs, in which the other side's threads block; some of them spin for a while after their work.
+/// Pause before each run, in which the other side's threads become idle; some of them spin for a while after their
+/// work.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.
@@ -89,8 +90,8 @@ impl WorkerProcess {
         peak_of_status(&status)
     }
 
-    /// Resets the peak memory, so that the preparation (reading weights, making pictures) does not count. If the
-    /// system does not allow this, it counts.
+    /// Resets the peak memory, so that the preparation (reading weights, making pictures) does not count. If the system
+    /// does not allow this, the preparation counts.
     fn forget_peak_memory(&self) {
         let _ = std::fs::write(format!("/proc/{}/clear_refs", self.child.id()), "5");
     }

@@ -120,7 +120,7 @@ fn measure_case(case: &Case, python: &Path, args: &MatchersArgs, sides: &mut [Si
     for (number, picture) in pictures.into_iter().enumerate() {
         let pixels = sdg_inputs::read_image(&picture.path)?;
         let mut first: Vec<Option<Tested>> = vec![None; sides.len()];
-        // The first round does not count: it reads the picture and prepares caches.
+        // The times of the first round do not count, because it reads the picture and prepares caches.
         for round in 0..=args.rounds as usize {
             for turn in 0..sides.len() {
                 let idx = (round + turn + number) % sides.len();

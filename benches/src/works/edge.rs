@@ -20,7 +20,7 @@ use crate::works::r50::sampled;
 /// work is the same on both sides.
 const GRID: (u32, u32) = (3, 2);
 const BATCH: u32 = 4;
-/// So low that the weights hardly change, so the hundredth step does the same work as the first.
+/// So low that the weights hardly change and the hundredth step does the same work as the first.
 const LEARNING_RATE: f64 = 1e-5;
 /// As in `sdg-training`.
 const WEIGHT_DECAY: f64 = 1e-4;

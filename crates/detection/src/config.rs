@@ -1,8 +1,8 @@
 //! The configuration of a detector: every setting in which R-CNN implementations differ.
 //!
-//! This module computes only sizes. Each enum names a choice that a bare bool or number would hide; the two values of
-//! most choices are Detectron2's and torchvision's. A configuration is plain data that can be serialised, so a model
-//! file can contain the configuration of its training.
+//! Each enum names a choice that a bare bool or number would hide; the two values of most choices are Detectron2's and
+//! torchvision's. A configuration is plain data that can be serialised, so a model file can contain the configuration
+//! of its training.
 
 mod mask_head;
 mod roi_pooler;
@@ -292,7 +292,7 @@ pub struct RpnConfig {
     pub post_nms_top_n: PerMode,
     /// IoU above which the lower-scoring of two proposals of a level is dropped.
     pub nms_threshold: f64,
-    /// Maximum side, in pixels, of the proposals that are dropped.
+    /// Proposals with a side of at most this many pixels are dropped.
     pub min_box_size_px: f64,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
@@ -358,13 +358,13 @@ pub struct BoxHeadConfig {
     pub box_coder: BoxCoderConfig,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
-    /// Minimum score of a detection.
+    /// The score of a detection is above this.
     pub score_threshold: f64,
     /// IoU above which the lower-scoring of two detections of a class is dropped.
     pub nms_threshold: f64,
     /// Detections kept per image.
     pub detections_per_image: usize,
-    /// Maximum side, in pixels of the resized image, of the detections that are dropped.
+    /// Detections with a side of at most this many pixels of the resized image are dropped.
     pub min_box_size_px: f64,
 }
 
@@ -374,8 +374,8 @@ pub enum KeypointReadout {
     /// The map is resized to the box's size, rounded up, by a bicubic filter, and the centre of the highest pixel is
     /// the keypoint: Detectron2 and torchvision.
     BicubicArgmax,
-    /// The mean position, weighted by the map's softmax, in a square of `2 radius + 1` cells around its highest cell:
-    /// finer than a cell, and cheaper.
+    /// The mean position, weighted by the map's softmax, in a square of side `2 radius + 1` cells around its highest
+    /// cell: finer than a cell, and cheaper.
     LocalMean {
         /// Number of cells on each side of the highest cell.
         radius: usize,

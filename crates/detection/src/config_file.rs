@@ -36,7 +36,7 @@ struct PresetChanges {
     box_head_fc: Option<usize>,
     keypoint_convs: Option<usize>,
     mask_convs: Option<usize>,
-    /// Origin and outputs of the reference, which are not used.
+    /// This field and the next two describe the reference and are not used.
     #[serde(rename = "width")]
     _width: Option<IgnoredAny>,
     #[serde(rename = "seed")]

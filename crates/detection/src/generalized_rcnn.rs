@@ -146,7 +146,8 @@ impl GeneralizedRcnn {
     /// are allowed: they teach the background.
     ///
     /// # Errors
-    /// No images, different numbers of images and targets, or a target that contradicts the configuration.
+    /// No images, different numbers of images and targets, or a target that contradicts itself, its image or the
+    /// configuration.
     pub fn losses(&self, images: &[TransformedImage], targets: &[Target], seed: u64) -> Result<Losses> {
         let targets = self.resized_targets(images, targets)?;
         Ok(self.losses_of_resized(images, &targets, seed))

@@ -151,7 +151,7 @@ pub struct PaddedBatch {
     pub dims: [usize; 4],
 }
 
-/// Pads images to the largest of them, rounded up to multiples of `size_divisibility`.
+/// Pads images to the largest height and the largest width among them, rounded up to multiples of `size_divisibility`.
 pub fn pad_batch(images: &[TransformedImage], size_divisibility: usize) -> PaddedBatch {
     let padded = |extent: fn(&TransformedImage) -> usize| {
         let largest = images.iter().map(extent).max().unwrap_or(0);

@@ -102,8 +102,9 @@ impl KeypointImprint {
     }
 }
 
-/// Cells of a pooled square of `side` cells and their weights, for linear interpolation of the square at a keypoint;
-/// `None` if the keypoint is unlabelled or outside the box. Coordinates are in pixels of the resized image.
+/// Cells of a pooled square of `side` × `side` cells and their weights, for linear interpolation of the square at a
+/// keypoint; `None` if the keypoint is unlabelled or outside the box, or the box has no area. Coordinates are in pixels
+/// of the resized image.
 pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> Option<[(usize, f32); 4]> {
     let [x1, y1, x2, y2] = corners.map(f64::from);
     let is_inside = (x1..=x2).contains(&keypoint.x) && (y1..=y2).contains(&keypoint.y);
@@ -126,16 +127,16 @@ pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> O
     ])
 }
 
-/// Kernel of four cells that doubles a map by linear interpolation, in the form of the transposed convolution.
+/// Kernel of the transposed convolution that doubles a map by linear interpolation, along one axis.
 const DOUBLING: [f32; 4] = [0.25, 0.75, 0.75, 0.25];
 
 /// Number of images evaluated at a time.
 const BATCH: usize = 16;
 
 impl Imprint {
-    /// Returns the last layers of a detector of one class, by the parameters' names: class scores, and keypoint maps
-    /// that are added to the detector's maps. The first object of each image is a view; without any view the result is
-    /// empty.
+    /// Returns the last layers of a detector of one class, by the parameters' names: the class scores, and the kernel
+    /// of the keypoint maps, which is the sum of the detector's kernel and the imprinted one. The first object of each
+    /// image is a view; without any view the result is empty.
     ///
     /// # Errors
     /// No images, or targets that do not fit them.

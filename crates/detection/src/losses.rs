@@ -1,4 +1,4 @@
-//! The losses, as sums; each caller divides by its own count.
+//! The loss functions, as sums; each caller divides by its own count.
 
 use burn::tensor::{Int, Tensor, TensorData, activation};
 use sdg_kernels::log_softmax;

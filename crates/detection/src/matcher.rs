@@ -82,7 +82,7 @@ mod tests {
         MatcherConfig { negative_below: 0.3, positive_from: 0.7, low_quality }
     }
 
-    // A 10 px high ground truth of width 10; a candidate of width w inside it overlaps w / 10.
+    // A 10 px high ground truth of width 10; a candidate of width w inside it has an IoU of w / 10.
     const GT: Corners = [0.0, 0.0, 10.0, 10.0];
     fn inside(width: f32) -> Corners {
         [0.0, 0.0, width, 10.0]

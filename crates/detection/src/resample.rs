@@ -127,8 +127,8 @@ mod tests {
 
     #[test]
     fn halving_averages_with_triangle_weights() {
-        // Filter half-width 2 around 1.0: weights 3/4·, 3/4, 1/4 on the first three pixels
-        // (distances 0.5, 0.5, 1.5 of 2), normalised by 7/4: (0·3 + 40·3 + 80·1) / 7 = 28.57.
+        // Filter half-width 2 around 1.0: weights 3/4, 3/4, 1/4 on the first three pixels (distances 0.5, 0.5, 1.5 of
+        // 2), normalised by 7/4: (0·3 + 40·3 + 80·1) / 7 = 28.57.
         let resized = antialiased_bytes(&ramp(), 2, 2);
         assert_eq!(resized[0], 29);
         assert_eq!(resized[2], 7);

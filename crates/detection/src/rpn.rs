@@ -4,10 +4,9 @@
 //! Shapes: N images, C channels, A anchors per cell, L anchors of an image over all levels, in the
 //! order level, row, column, aspect ratio.
 //!
-//! Glossary: *objectness logits* are the scores of the anchors before the sigmoid; *deltas*
-//! describe a box relative to its anchor; *proposals* are the boxes that remain after top-k and
-//! NMS. The network runs on the device; anchors, matching, decoding and NMS run on the host, after
-//! one read each.
+//! Glossary: *objectness logits* are the scores of the anchors before the sigmoid; *deltas* describe a box relative to
+//! its anchor; *proposals* are the boxes that remain after top-k and NMS. The network runs on the device; anchors,
+//! matching, decoding and NMS run on the host, after one read of the network's outputs.
 
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, read_sync};
@@ -74,7 +73,7 @@ pub type ImageSize = [usize; 2];
 /// Training or inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Training: more proposals are kept for the second stage.
+    /// Training, with numbers of proposals of its own.
     Train,
     /// Inference.
     Test,
@@ -242,7 +241,7 @@ impl RegionProposalNetwork {
     }
 }
 
-/// Indices of the `k` largest values, largest first; equal values keep their order.
+/// Indices of the `k` largest values without NaN, largest first; equal values keep their order.
 fn top_k(values: &[f32], k: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
     let by_value = |a: &usize, b: &usize| values[*b].total_cmp(&values[*a]).then(a.cmp(b));

@@ -64,7 +64,7 @@ impl ObjectMask {
             }
             Self::Bitmap(mask) => mask,
         };
-        // Pillow takes the pixel below the new pixel's centre, torch the pixel below its
+        // Pillow takes the pixel that contains the new pixel's centre, torch the one that contains its upper left
         // corner.
         let offset = match kind {
             MaskTargets::Rasterized => 0.5,

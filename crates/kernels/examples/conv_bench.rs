@@ -1,4 +1,4 @@
-//! Convolution forwards and backwards at training sizes: this crate's compared with burn-flex's own.
+//! Convolution forwards and backwards at training sizes: this crate's kernels compared with burn-flex's own.
 //!
 //! `cargo run --release -p sdg-kernels --example conv_bench`
 
@@ -9,7 +9,7 @@ use burn::tensor::ops::ConvOptions;
 use burn::tensor::{Device, Distribution, Tensor};
 use sdg_kernels::{Conv2dParams, conv2d};
 
-/// Best of five, after one warm-up: seconds of the forward pass and of the backward pass.
+/// Seconds of the forward pass and of the backward pass: the minimum of six runs.
 fn time(operation: impl Fn(Tensor<4>, Tensor<4>) -> Tensor<4>, x: [usize; 4], weight: [usize; 4]) -> [f64; 2] {
     let device = Device::flex().autodiff();
     let x = Tensor::<4>::random(x, Distribution::Default, &device).require_grad();

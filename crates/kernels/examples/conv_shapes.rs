@@ -1,4 +1,5 @@
-//! Times of an R50-FPN backbone at 480×640: each of its convolutions alone, forwards, with packed weights.
+//! Times of an R50-FPN backbone at 480×640: each convolution alone, forwards, with packed weights. Left out are the
+//! FPN's convolutions at p4 and p5.
 //!
 //! `cargo run --release -p sdg-kernels --example conv_shapes`
 
@@ -45,7 +46,7 @@ fn main() {
     let (mut all_ms, mut all_gflop) = (0.0, 0.0);
     for (name, count, [channels_in, channels_out], [height, width], kernel, stride) in cases {
         let x = Tensor::<4>::random([1, channels_in, height, width], Distribution::Default, &device);
-        // From a convolution, so that its memory layout is that of the backbone's own maps.
+        // The input comes from a convolution, so that it has the memory layout of the backbone's own maps.
         let eye = Tensor::<2>::eye(channels_in, &device).reshape([channels_in, channels_in, 1, 1]);
         let x = conv2d(x, eye, None, Conv2dParams::square(1, 0));
         let shape = [channels_out, channels_in, kernel, kernel];

@@ -1,7 +1,7 @@
-//! AdamW's update of one parameter, its gradient clipped by its norm.
+//! AdamW's update of one parameter, whose gradient is first clipped to a maximum norm.
 //!
-//! Composed of tensor operations, an update reads and writes its moments a dozen times, on one thread: a fifth of
-//! the `edge` preset's training step. Here three passes do it on all cores: norm, moments, value.
+//! Composed of tensor operations, an update reads and writes its moments a dozen times, on one thread: a fifth of the
+//! `edge` preset's training step. Here an update is three passes on all cores: norm, moments, value.
 //!
 //! Source: Loshchilov and Hutter, Decoupled Weight Decay Regularization (2019).
 
@@ -79,7 +79,7 @@ pub(crate) fn value_after(isa: Isa, values: &[f32], moments: &[f32], params: Ada
     unsafe { output.into_vec() }
 }
 
-/// The factor of the gradient.
+/// The factor that limits the gradient's norm to `max_norm`.
 fn clip_factor(isa: Isa, grad: &[f32], max_norm: Option<f32>) -> f32 {
     let Some(max_norm) = max_norm else { return 1.0 };
     let units = grad.len().div_ceil(UNIT);
@@ -132,7 +132,7 @@ widest! {
 
 widest! {
     fn sum_of_squares(values: &[f32]) -> f32 {
-        // Sixteen parallel sums: a vector of them, in an order that no instruction set changes.
+        // Sixteen parallel sums fill a vector; their order is the same for every instruction set.
         let mut sums = [0.0_f32; 16];
         let chunks = values.chunks_exact(sums.len());
         let rest: f32 = chunks.remainder().iter().map(|value| value * value).sum();
@@ -225,7 +225,7 @@ mod tests {
         let grad = Tensor::<2>::ones([3, 40], &device);
         let (value, moments) =
             adamw(Tensor::zeros([3, 40], &device), grad.clone(), None, AdamWParams { step: 1, ..PARAMS });
-        // All gradients equal: every value moves by the whole step.
+        // All gradients equal: every value moves by the learning rate.
         let first: Vec<f32> = value.clone().into_data().try_to_vec().unwrap();
         assert!(first.iter().all(|value| (value + 0.01).abs() < 1e-6), "{first:?}");
         let (value, _) = adamw(value, grad, Some(moments), AdamWParams { step: 2, ..PARAMS });

@@ -430,7 +430,7 @@ impl Backward<Flex, 2> for CosinesBackward {
 struct RoiAlignBackward;
 
 impl Backward<Flex, 1> for RoiAlignBackward {
-    /// ROIs, shape of the features.
+    /// ROIs, shape of the features, parameters.
     type State = (FlexTensor, [usize; 4], RoiAlignParams);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
@@ -493,7 +493,7 @@ impl Backward<Flex, 4> for GroupNormBackward {
 struct MaxPoolBackward;
 
 impl Backward<Flex, 1> for MaxPoolBackward {
-    /// x and output.
+    /// x, output and sizes.
     type State = (FlexTensor, FlexTensor, PoolShape);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {

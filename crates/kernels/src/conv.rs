@@ -1,7 +1,8 @@
 //! Two-dimensional convolution and its transpose.
 //!
-//! Results have the channels-last layout in memory, for any shape: further convolutions, normalisations, poolings and
-//! crops of this crate then read them in place. Operations of burn accept them like any permuted tensor.
+//! On the CPU, `f32` results have the channels-last layout in memory, for any shape: further convolutions,
+//! normalisations, poolings and crops of this crate then read them in place. Operations of burn accept them like any
+//! permuted tensor.
 //!
 //! Shapes: N images, Ci channels in, Co channels out, a kernel of Kh × Kw, maps of Hi × Wi and Ho × Wo.
 
@@ -110,7 +111,7 @@ fn absent<const D: usize>(x: &Tensor<4>) -> Tensor<D> {
     Tensor::zeros([1; D], (&x.device(), x.dtype()))
 }
 
-/// Transposed convolution: the map whose gradient with respect to its input is [`conv2d`].
+/// Transposed convolution: the linear function whose gradient with respect to its input is [`conv2d`].
 ///
 /// # Shapes
 /// `x` `[N, Ci, Hi, Wi]`, `weight` `[Ci, Co, Kh, Kw]` (input channels first, as in PyTorch), `bias` `[Co]`;

@@ -18,7 +18,7 @@ use crate::params::CosineParams;
 use crate::simd::{Isa, widest};
 
 /// The cosine between each cell of `one` and the cells up to `reach` cells away in `other`; 0 beyond the border.
-/// `epsilon` is added to the square of a cell's length, so that a cell without features has the direction zero.
+/// `epsilon` is added to the square of a cell's length, so that a cell without features becomes a zero vector.
 ///
 /// # Shapes
 /// `one` and `other` are `[N, C, H, W]`; the result is `[N, (2 reach + 1)², H, W]`.
@@ -208,7 +208,7 @@ widest! {
 widest! {
     // A row of sums over channels, which are `steps` apart in the two maps.
     fn products(target: &mut [MaybeUninit<f32>], maps: [&[f32]; 2], steps: [usize; 2], channels: usize) -> () {
-        /// Sums that stay in registers.
+        /// Number of sums that stay in registers.
         const BLOCK: usize = 16;
         let width = target.len();
         for (block, target) in target.chunks_mut(BLOCK).enumerate() {

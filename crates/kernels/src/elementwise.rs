@@ -6,7 +6,7 @@ use crate::parallel::{Output, SharedSlice, for_each_unit};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, transpose, widest};
 
-/// Number of positions that are summed in `f32` before they are added to an `f64`.
+/// Number of positions that are summed in `f32` before the sum is added to an `f64`.
 const CHUNK: usize = 512;
 
 /// Sums over positions, the gradient with respect to a bias.

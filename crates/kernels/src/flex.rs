@@ -191,7 +191,7 @@ pub(crate) fn convolved(
     keep: Keep,
 ) -> FlexTensor {
     let isa = Isa::detect();
-    // A copy would be another tensor each time, not worth caching.
+    // A contiguous copy would be a new tensor each time, so that caching its packed form is useless.
     let keep = if weight.is_contiguous() { keep } else { Keep::No };
     let weight = weight.to_contiguous();
     let filters = |winograd| packed::filters(isa, &weight, shape, direction, winograd, keep);

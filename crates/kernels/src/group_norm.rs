@@ -1,4 +1,4 @@
-//! Group normalisation in one pass forwards and one backwards, optionally with the ReLU that follows it.
+//! Group normalisation in two passes forwards and two backwards, optionally with the ReLU that follows it.
 //!
 //! Shapes: N images, C channels in G groups, P pixels; a group of an image has m = C/G · P values.
 //!

@@ -1,7 +1,7 @@
 //! CPU kernels for the most expensive operations of a detector, behind burn's backend extension.
 //!
 //! burn's CPU backend `Flex` runs a convolution forwards at a moderate speed and backwards through a generic fallback,
-//! and it has no ROIAlign. This crate adds both, and the other operations that took most of the training time: 3×3
+//! and it has no ROIAlign. This crate adds both, and the other operations that took most of the training time: most 3×3
 //! convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps in place, group
 //! norm, max pooling, upsampling, log-softmax, cosines between maps, AdamW's update, and non-maximum suppression.
 //!
@@ -14,9 +14,10 @@
 //!        └─ any other backend             the default body: burn's own tensor operations
 //! ```
 //!
-//! Tensors are `[N, C, H, W]`, contiguous or not; results are channels last in memory (`[N, H, W, C]`, visible from
-//! their strides), so that the next operation of this crate reads them in place. The kernels are for `f32`; any other
-//! float type takes the composed default. Results are bit-identical for any number of threads.
+//! Tensors are `[N, C, H, W]`, contiguous or not; maps that the kernels return, except those of `cosines` and
+//! `permute_maps`, are channels last in memory (`[N, H, W, C]`, visible from their strides), so that the next operation
+//! of this crate reads them in place. The kernels are for `f32`; any other float type takes the composed default.
+//! Results are bit-identical for any number of threads.
 //!
 //! Deliberately not included: groups and dilation (no detector here has them), gradients with respect
 //! to ROI coordinates (the R-CNN family treats proposals as constants), and GPU kernels other than ROIAlign's.

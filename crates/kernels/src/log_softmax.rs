@@ -77,7 +77,7 @@ pub(crate) fn backward(isa: Isa, grad: &[f32], kept: &Kept) -> Vec<f32> {
     unsafe { output.into_vec() }
 }
 
-/// The sum in the order in which burn's CPU backend adds on this machine, so that results stay the same.
+/// The sum in the order in which burn's CPU backend adds on this machine, so that results equal burn's.
 fn sum(isa: Isa, values: &[f32]) -> f32 {
     match isa {
         #[cfg(target_arch = "x86_64")]

@@ -25,7 +25,7 @@ struct Key {
     weight: [usize; 4],
     direction: Direction,
     winograd: bool,
-    /// Phases of the stride, each with its own product in the backward direction.
+    /// Stride, padding and number of phases, which determine the products of the backward direction; zeros forwards.
     phases: [[usize; 2]; 3],
 }
 

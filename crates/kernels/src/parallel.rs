@@ -35,7 +35,7 @@ pub(crate) struct SharedSlice<'a> {
     slice: PhantomData<&'a mut [f32]>,
 }
 
-// SAFETY: the only access is through `range`, whose callers promise disjoint parts.
+// SAFETY: the only access is through `range` and `raw`, whose callers promise disjoint parts.
 unsafe impl Sync for SharedSlice<'_> {}
 // SAFETY: it is a pointer to floats, which may be written on any thread.
 unsafe impl Send for SharedSlice<'_> {}

@@ -151,11 +151,11 @@ pub struct AdamWParams {
     pub learning_rate: f32,
     /// Fraction of the gradient's running mean that a step keeps.
     pub beta_1: f32,
-    /// Fraction of the running mean of its squares that a step keeps.
+    /// Fraction of the running mean of the gradient's squares that a step keeps.
     pub beta_2: f32,
     /// Added to the root of the mean square.
     pub epsilon: f32,
-    /// Fraction of the value that a step of length 1 removes.
+    /// Fraction of the value that a step with a learning rate of 1 removes.
     pub weight_decay: f32,
     /// Maximum Euclidean norm of the gradient; larger gradients are scaled down to it.
     pub max_norm: Option<f32>,

@@ -56,7 +56,7 @@ pub(crate) struct PanelProduct<'a> {
     pub(crate) left: Operand<'a>,
     /// Readable for columns rounded up to 16.
     pub(crate) right: Operand<'a>,
-    /// Pointer to element (0, 0) of the output.
+    /// Index of the panel's element (0, 0) in the output.
     pub(crate) at: usize,
     /// Step from one row of the output to the next.
     pub(crate) row_step: usize,
@@ -130,7 +130,7 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let mut row = 0;
     let mut prefetch = product.prefetch;
     for tile in 0..tiles {
-        // Tiles of nearly equal height, because short tiles wait for their sums.
+        // Tiles of nearly equal height, because in a short tile each addition waits for the one before.
         let rows = (product.rows - row).div_ceil(tiles - tile);
         let step = LANES * L::VECTORS;
         let mut column = 0;

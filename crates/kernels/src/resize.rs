@@ -19,7 +19,7 @@ mod tests;
 ///
 /// # Panics
 /// If a dimension, stride or side of the window is 0, the window has more than 255 pixels, the padding is more than
-/// half of it, or it is larger than the padded input.
+/// half the window, or the window is larger than the padded input.
 pub fn max_pool2d(x: Tensor<4>, params: MaxPool2dParams) -> Tensor<4> {
     let [_, _, height, width] = x.dims();
     let MaxPool2dParams { kernel, stride, padding } = params;

@@ -2,13 +2,13 @@
 //!
 //! Shapes: N images, C channels, maps of H × W, R regions of interest, crops of Ph × Pw bins.
 //!
-//! Glossary: *ROI*, a box in image pixels with the index of its image; *bin*, one cell of the crop; *grid*,
-//! the samples that a bin averages along one axis. Bilinear sampling and averaging are separable, so a bin
-//! is `Σ_y Σ_x weight_y · weight_x · feature(y, x)`, and [`AxisBins`] holds the weights of one axis.
+//! Glossary: *ROI*, a box in image pixels with the index of its image; *bin*, one cell of the crop; *grid*, the samples
+//! that a bin averages along one axis. Bilinear sampling and averaging are separable, so a bin is `Σ_y Σ_x weight_y ·
+//! weight_x · feature(y, x)`, and [`AxisBins`](crate::roi_bins::AxisBins) holds the weights of one axis.
 //!
-//! Source: He et al., Mask R-CNN (2017), section 3; the conventions of Detectron2's `ROIAlign` (`aligned`)
-//! and torchvision's `roi_align`, which differ by [`RoiAlignment`]. Two intended differences: samples are
-//! weighted in per-axis order, so the last bits differ, and an ROI with a non-finite corner gives zeros.
+//! Source: He et al., Mask R-CNN (2017), section 3; the conventions of Detectron2's `ROIAlign` (`aligned`) and
+//! torchvision's `roi_align`, which differ by [`RoiAlignment`](crate::RoiAlignment). Two intended differences: samples
+//! are weighted in per-axis order, so the last bits differ, and an ROI with a non-finite corner gives zeros.
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
@@ -29,8 +29,8 @@ mod tests;
 /// is `[R, C, Ph, Pw]`. R may be 0.
 ///
 /// # Panics
-/// For other shapes, if the output size or a fixed sampling ratio is 0, or if an image index is not an
-/// integer in `0..N`.
+/// For other shapes; if the output size or a fixed sampling ratio is 0, the spatial scale is not positive and finite,
+/// or `features` is empty while R > 0; and, except on wgpu and CUDA, if an image index is not an integer in `0..N`.
 pub fn roi_align(features: Tensor<4>, rois: Tensor<2>, params: RoiAlignParams) -> Tensor<4> {
     let [num_images, channels, height, width] = features.dims();
     let [num_rois, columns] = rois.dims();

@@ -7,7 +7,7 @@ thread_local! {
     static FREE: RefCell<Vec<Vec<f32>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A borrowed buffer, returned to its thread when dropped. Its contents are arbitrary.
+/// A borrowed buffer. When it is dropped, it joins the free buffers of the dropping thread. Its contents are arbitrary.
 pub(crate) struct Scratch {
     buffer: Vec<f32>,
     len: usize,

@@ -1,4 +1,5 @@
-//! Compares every operation, forwards and backwards, on every device of the build with `Flex`.
+//! Compares the operations except `cosines` and `log_softmax`, forwards and backwards, on every device of the build
+//! with `Flex`.
 //!
 //! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
 #![cfg(any(feature = "ndarray", feature = "wgpu", feature = "cuda"))]
@@ -14,7 +15,6 @@ use sdg_kernels::{
 };
 
 /// Maximum difference, relative to the largest magnitude: sums of up to a thousand products in a different order.
-/// Most of it comes from Winograd's transforms, which flex uses.
 const RELATIVE: f32 = 2e-5;
 
 /// Devices to compare with `Flex`.
@@ -40,8 +40,8 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().try_into_vec().unwrap()
 }
 
-/// Runs `operation` on its inputs, with respect to which it may be differentiated, and compares its result and the
-/// gradients of a weighted sum of it between `Flex` and each device; asserts that they agree.
+/// Runs `operation` on `Flex` and on each device; asserts that the results, and the gradients of their weighted sum
+/// with respect to the inputs, agree.
 fn assert_agrees<const N: usize>(
     name: &str,
     inputs: [[usize; 4]; N],

@@ -158,7 +158,7 @@ impl Conv2d {
         self.forward_then(x, None, Activation::Relu)
     }
 
-    /// Convolves and normalises, adds `residual` and activates, all in one pass over the result.
+    /// Convolves and normalises, adds `residual` and activates; except for group norm, in one pass over the result.
     ///
     /// # Shapes
     /// As for [`Self::forward`]; `residual` has the shape of the output.

@@ -1,7 +1,6 @@
 //! A convolution with group norm and ReLU, and sequences of them: the blocks of the small networks.
 //!
-//! [`Conv2d`](crate::Conv2d) is the general convolution, with any norm; its parameters have other names, which
-//! weights files use.
+//! [`Conv2d`](crate::Conv2d) is the general convolution, with any norm and an optional residual.
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;

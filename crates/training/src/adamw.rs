@@ -23,7 +23,7 @@ pub struct AdamW {
 
 impl AdamW {
     /// With β of 0.9 and 0.999 and ε of 1e-8. `weight_decay` is decoupled from the gradients; each parameter's gradient
-    /// is scaled down to a norm of `max_gradient_norm` if it is larger.
+    /// is scaled down to a norm of `max_gradient_norm` if its norm is larger.
     pub fn new(weight_decay: f64, max_gradient_norm: f64) -> Self {
         Self { weight_decay, max_gradient_norm, step: 0, moments: HashMap::new() }
     }

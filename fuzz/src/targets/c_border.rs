@@ -128,7 +128,7 @@ fn detect(input: &mut Numbers<'_>) -> bool {
     true
 }
 
-/// A text of the input up to its zero byte, as a path inside `folder`, so that nothing else is written.
+/// A text of the input up to its zero byte, as a path inside `folder`, so that nothing is written elsewhere.
 fn path_in(folder: &std::path::Path, input: &mut Numbers<'_>) -> CString {
     let end = input.0.iter().position(|byte| *byte == 0).unwrap_or(input.0.len());
     let mut name = input.bytes(end);

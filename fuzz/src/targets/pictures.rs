@@ -41,7 +41,7 @@ fn read(bytes: &[u8]) -> bool {
     decode_image_in(bytes, &LIMITS, PixelFrame::Upright).is_ok()
 }
 
-/// PNG, with one kind of pixels and with several.
+/// PNG with different kinds of pixels: 8 and 16 bits, grey, with alpha.
 pub(super) const PNG: Target = Target {
     name: "png",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -134,7 +134,7 @@ pub(super) const TIFF: Target = Target {
     run: read,
 };
 
-/// WebP, BMP, PPM, and a photo with the file name that phones give it.
+/// WebP, BMP, PPM, and a JPEG photo.
 pub(super) const OTHERS: Target = Target {
     name: "webp_bmp_ppm",
     max_extra_bytes: MAX_EXTRA_BYTES,

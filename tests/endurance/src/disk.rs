@@ -4,7 +4,7 @@
 //! - The content of a file is durable after the file's own fsync; content that changed since then may be lost,
 //!   truncated, or end in zeros.
 //! - The names in a folder (create, rename, link, unlink) are durable after the folder's own fsync; of the changes
-//!   since then, a first part of any length may be on the disk, in their order, independently for each folder.
+//!   since then, any number of the first ones may be on the disk, independently for each folder.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

@@ -28,7 +28,7 @@ use crate::scenario::Places;
 const TIMEOUT: Duration = Duration::from_secs(120);
 /// Maximum relative growth of the memory: the allocator keeps some for itself.
 const MAX_GROWTH: f64 = 1.05;
-/// Maximum growth in KiB where the whole is small: about one block of the allocator.
+/// Maximum growth in KiB if the memory is small: about one block of the allocator.
 const MAX_GROWTH_KIB: u64 = 4 << 10;
 /// Maximum ratio of the processor time per unit in the last tenth to that in the fifth: other programs take part of the
 /// caches.

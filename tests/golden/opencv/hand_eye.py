@@ -46,7 +46,7 @@ for name in ("hand", "base"):
     for views in told[name]["trials"]:
         robot = [transform(view["base_from_flange"]) for view in views]
         if name == "base":
-            # According to its documentation, a camera beside the robot needs the inverse poses.
+            # According to OpenCV's documentation, a camera beside the robot needs the inverse poses.
             robot = [np.linalg.inv(pose) for pose in robot]
         boards = [board_pose(view["corners"]) for view in views]
         for method in METHODS:
@@ -58,7 +58,7 @@ for name in ("hand", "base"):
             errors[method].append((off, np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
     result[name] = {}
     for method, values in errors.items():
-        # As in the test: the upper of two middle values.
+        # As in the test: of two middle values, the upper one.
         values = np.sort(np.array(values), axis=0)
         middle = values[len(values) // 2]
         result[name][method] = {"median_mm": middle[0], "median_deg": middle[1], "worst_mm": values[-1][0],

@@ -59,7 +59,7 @@ class NarrowResNet(ResNet):
 
 
 def save_file(tensors, path):
-    """A safetensors file of float, integer and byte tensors."""
+    """Writes a safetensors file of float, integer and byte tensors."""
     names = {torch.float32: "F32", torch.int64: "I64", torch.uint8: "U8"}
     # Wider elements first, so that all are aligned.
     ordered = sorted(tensors.items(), key=lambda item: -item[1].element_size())
@@ -79,7 +79,7 @@ def save_file(tensors, path):
 def build(kind, narrow, limits):
     if narrow:
         body = NarrowResNet(Bottleneck, [1, 1, 1, 1], norm_layer=FrozenBatchNorm2d)
-        # Its own width is not used, but would be checked.
+        # The backbone does not use this layer, whose width does not fit the narrow ones.
         body.fc = torch.nn.Identity()
         layers = ["layer4", "layer3", "layer2"]
         for name, parameter in body.named_parameters():
@@ -112,7 +112,7 @@ def build(kind, narrow, limits):
 
 
 def randomize(model, seed, residual_gain=1.0):
-    """Values of such a size that features neither vanish nor grow, and that classes differ.
+    """Sets values with which features neither vanish nor grow, and classes differ.
 
     Every residual block adds to the features; in a deep network each must add little.
     """
@@ -202,7 +202,7 @@ def count_detections(model):
 
 
 def randomize_until_found(model, seed, residual_gain=1.0):
-    """A network with detections: not every random network has any."""
+    """Repeats `randomize` until there are four detections: not every random network has any."""
     while randomize(model, seed, residual_gain) or count_detections(model) < 4:
         seed += 10
 
@@ -218,7 +218,7 @@ def training_step(model, kind, image):
         y = boxes[:, 1, None] + steps.flip(0) ** 2 * (boxes[:, 3] - boxes[:, 1])[:, None]
         visible = torch.ones_like(x)
         visible[1, 2] = 0
-        # Only single precision is accepted.
+        # torchvision accepts keypoints only in single precision.
         target["keypoints"] = torch.stack([x, y, visible], 2).float()
     if kind == "mask":
         masks = []

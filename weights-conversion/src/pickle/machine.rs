@@ -183,7 +183,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Text, Python 2 strings and bytes: short ones are read; of the others only the position is stored.
+    /// Text, Python 2 strings and bytes: short text is read; of all others only the position is stored.
     fn string(&mut self, opcode: u8) -> Result<()> {
         let scanner = &mut self.scanner;
         let len = match opcode {

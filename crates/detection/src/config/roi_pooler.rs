@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Positions of ROIAlign's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RoiAlignment {
-    /// Shifted by half a cell, which is correct for this pixel model: Detectron2's
-    /// `aligned`.
+    /// Shifted by half a cell, which is correct for pixel centres at (0.5, 0.5): Detectron2's `aligned`.
     HalfPixel,
     /// Not shifted: torchvision's detectors.
     Legacy,

@@ -97,7 +97,7 @@ impl MaskHead {
     /// Returns the binary cross-entropy of the true class's map, averaged over all cells of all ROIs, with the
     /// configured weights.
     ///
-    /// `rois` are at least one, all on objects; `image_sizes` are those of the resized images.
+    /// `rois` has at least one ROI, and all are on objects; `image_sizes` are those of the resized images.
     pub fn loss(
         &self,
         features: &[Tensor<4>; 5],

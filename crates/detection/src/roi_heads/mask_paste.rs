@@ -145,9 +145,9 @@ mod tests {
 
     #[test]
     fn whole_pixels_take_the_last_one_in() {
-        // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost
-        // pixels are at most a quarter of a cell inside and have the value 0.75. In y, from 5 to 10 in the same
-        // way.
+        // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost columns
+        // are read a quarter of a cell outside the first cell's centre and have the value 0.75. In y the box extends
+        // from 5 to 10 in the same way.
         let mask = full().paste(&BOUNDS, 20, 20, 0.5, MaskPasting::WholePixels);
         assert_eq!(mask.bounds(), Some(BoundingBox { x1: 3.0, y1: 5.0, x2: 15.0, y2: 11.0 }));
     }

@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn pooled_targets_keep_fractions_and_rasterized_ones_are_cut() {
-        // The left quarter of an 8x8 image, pooled into 2x2 cells of four pixels, covers half of the left cells.
+        // The left quarter of an 8x8 image, pooled into 2x2 cells of 4x4 pixels, covers half of the left cells.
         let bitmap = ObjectMask::Bitmap(Mask::from_fn(8, 8, |x, _| x < 2));
         let roi = [0.0, 0.0, 8.0, 8.0];
         let legacy = encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Pooled);

@@ -176,7 +176,7 @@ impl RoiHeads {
     }
 }
 
-/// Samples proposals on objects for a head in training: those that are `fit` for it (a function of the
+/// Samples proposals on objects for a head in training: those that are `fit` for it (a function of the ROI and of the
 /// object's index in its image), at most `max` per image.
 fn choose_objects(
     rois: &[SampledRoi],

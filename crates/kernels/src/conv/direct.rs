@@ -38,7 +38,7 @@ pub(crate) struct Target {
     pub(crate) step: [usize; 2],
 }
 
-/// One product.
+/// A convolution, or one phase of a transposed convolution.
 pub(crate) struct DirectConv<'a> {
     pub(crate) source: Maps<'a>,
     /// Input pixel of the window's first cell at the first position.
@@ -54,7 +54,7 @@ pub(crate) struct DirectConv<'a> {
 }
 
 impl DirectConv<'_> {
-    /// Computes all positions and writes them to `output`, `[N, H, W, M]` of the target's size.
+    /// Computes all positions and writes them to `output`, `[N, H, W, M]` of the target's size for M output channels.
     ///
     /// # Safety
     /// Nothing else accesses the grid's pixels of `output`.
@@ -176,8 +176,8 @@ impl DirectConv<'_> {
         }
     }
 
-    /// The data read after a panel: the next panel or, after the last panel (`end`), `next`, the next unit's
-    /// positions.
+    /// The data read after a panel: the next panel or, after the last panel before `end`, the next unit's positions
+    /// (`next`).
     fn prefetch<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Prefetch<'a> {
         let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
         Prefetch { runs: [run, &[]] }

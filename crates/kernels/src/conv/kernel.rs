@@ -1,4 +1,4 @@
-//! Convolution forwards, its input's gradient, and its bias's gradient, on `f32` slices.
+//! A convolution forwards, and the gradient of its input, on `f32` slices.
 //!
 //! Maps are channels last, `[N, H, W, C]`.
 
@@ -11,9 +11,9 @@ use crate::parallel::{Output, Raw};
 use crate::product::Epilogue;
 use crate::simd::Isa;
 
-/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` forwards, `[N, Hi, Wi, Ci]` from the
-/// output's gradient backwards. `filters` contains the packed weight, for Winograd's method or for direct
-/// products.
+/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from the input forwards, `[N, Hi, Wi, Ci]` from the
+/// output's gradient backwards. `filters` returns the packed weight, for Winograd's method (`true`) or for direct
+/// products (`false`).
 pub(crate) fn convolve(
     isa: Isa,
     direction: Direction,

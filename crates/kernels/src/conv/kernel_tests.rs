@@ -133,7 +133,7 @@ fn every_path_agrees_with_plain_loops() {
         ([1, 3, 4, 130], [20, 3, 5], [1, 3], [2, 0]),
         ([1, 3, 5, 5], [2, 1, 1], [3, 3], [1, 1]),
         ([1, 2, 3, 3], [3, 1, 2], [4, 4], [0, 0]),
-        // Several units of work and several blocks of K.
+        // Several units of work and several blocks of positions.
         ([1, 24, 40, 70], [8, 3, 3], [1, 1], [1, 1]),
         ([3, 9, 30, 41], [11, 3, 3], [1, 1], [1, 1]),
         // Winograd's method: whole and clipped tiles, every padding, one panel and several, many tiles and few.
@@ -180,7 +180,7 @@ proptest! {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let isa = Isa::detect();
-    // Large maps, and small maps whose filters are distributed.
+    // Large maps, and small maps whose filters are divided among the threads.
     for x in [[2, 12, 50, 70], [3, 40, 6, 5], [2, 16, 70, 70], [1, 96, 9, 9]] {
         for stride in [1, 2] {
             let case = ConvCase { x, out_channels: 48, kernel: [3, 3], params: Conv2dParams::square(stride, 1) };
@@ -210,7 +210,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
-    // Two channels are convolved directly; sixteen by Winograd's method, which must detect it.
+    // Two channels are convolved directly; sixteen by Winograd's method, which must detect values that are not finite.
     for channels in [2, 16] {
         let x = [1, channels, 6, 60];
         let case = ConvCase { x, out_channels: channels, kernel: [3, 3], params: Conv2dParams::square(1, 1) };

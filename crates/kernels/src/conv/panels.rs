@@ -29,7 +29,8 @@ impl Direction {
     }
 }
 
-/// Panels of packed weights, `[⌈columns/32⌉, depth, 32]`; for Winograd's method once per frequency.
+/// Panels of packed weights, `[⌈columns/32⌉, depth, 32]`, where the last panel may be 16 wide; for Winograd's method
+/// one such array per frequency.
 #[derive(Clone)]
 pub(crate) struct Panels {
     pub(crate) values: Arc<Scratch>,

@@ -72,7 +72,8 @@ impl ConvShape {
     }
 }
 
-/// Input pixels with the same remainder of `i + padding`, which share the kernel cells that reach them.
+/// Input pixels i with the same remainder of `i + padding` modulo the stride, which share the kernel cells that reach
+/// them.
 ///
 /// Input pixel i is reached by output pixel o through kernel cell k if `i + padding = o·stride + k`: each phase is a
 /// convolution of stride 1 over the output's gradient, with those cells only.

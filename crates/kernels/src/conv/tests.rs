@@ -326,7 +326,7 @@ fn gradients_of_what_is_read_more_than_once_are_added() {
         let map = conv(image.clone(), &weights[0]);
         let loss = conv(map.clone(), &weights[1]).square().sum()
             + conv(map.clone(), &weights[2]).exp().sum()
-            // An operation of burn itself, between ours and in parallel.
+            // An operation of burn itself that reads the same map as ours.
             + (map * 3.0).sum()
             + conv(image.clone() * 0.5, &weights[0]).square().sum()
             + conv(image.clone(), &weights[0]).exp().sum();

@@ -2,9 +2,9 @@
 //!
 //! `grad[m, ky, kx, c] = Σ_p output_grad[p, m] · x[position(p)·stride + (ky, kx) − padding, c]`
 //!
-//! Maps are channels last, so that the values that a kernel row ky needs at a position are one run of Kw·C floats,
-//! and the next position's run starts stride·C later: rows of the product are output channels, columns run along
-//! (kx, c), and its depth is the positions, all read in place (x after zeros were added around it, if it is padded).
+//! Maps are channels last, so the values that a kernel row ky needs at a position are one run of Kw·C floats, and the
+//! next position's run starts stride·C later. The product has output channels as rows, (kx, c) as columns, and
+//! positions as depth. It reads everything in place; only a padded x is first copied with zeros around it.
 //!
 //! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 
@@ -16,7 +16,7 @@ use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
 
-/// Maximum number of positions summed at a time, so that they are read repeatedly from a near cache.
+/// Approximate number of positions summed at a time, so that they are read repeatedly from a near cache.
 const BLOCK_POSITIONS: usize = 256;
 /// Minimum number of positions of a chunk.
 const CHUNK_POSITIONS: usize = 2048;
@@ -179,7 +179,7 @@ impl<'a> PaddedInput<'a> {
         Self { values: PaddedValues::Copied(values), height, width, channels, stride }
     }
 
-    /// The input of kernel row `kernel_y` from output row `y` of an image on, from column `first` of its run on.
+    /// The input of kernel row `kernel_y`, beginning with output row `y` of an image and column `first` of the run.
     fn rows(&self, image: usize, y: usize, kernel_y: usize, first: usize) -> Operand<'_> {
         let values: &[f32] = match &self.values {
             PaddedValues::InPlace(values) => values,

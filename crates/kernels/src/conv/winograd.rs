@@ -7,9 +7,9 @@
 //! so that for each of the 36 *frequencies* the sum over channels is a matrix product of all tiles with all
 //! filters. The weight's gradient is the adjoint: `Gᵀ [Σ_tiles (Bᵀ d B) ⊙ (A ȳ Aᵀ)] G`.
 //!
-//! The points are 0, ±1/√2, ±√2, ∞: with those the error grows several times less than with 0, ±1, ±2, ∞. Values
-//! that are not finite would spread over their tile, so that each result is checked, and computed directly if it
-//! contains one.
+//! The points are 0, ±1/√2, ±√2, ∞: with these the rounding error is several times smaller than with 0, ±1, ±2, ∞.
+//! Values that are not finite would spread over their tile, so that each result is checked; if one of its values is not
+//! finite, it is computed again directly.
 //!
 //! Source: Lavin and Gray, Fast Algorithms for Convolutional Neural Networks (2015); the points after Barabasz et
 //! al., Error Analysis and Improving the Accuracy of Winograd Convolution (2018).
@@ -96,8 +96,8 @@ pub(super) unsafe fn run(
     let num_tiles = tiling.len();
     let finite = AtomicBool::new(true);
     let conv = Winograd { isa, source, padding, out_size, filters, epilogue, output, tiling, finite: &finite };
-    // Many tiles: each unit takes some through all steps. Few: they are processed together, and the steps are
-    // distributed.
+    // If there are many tiles, each unit computes all steps for some of them. Few tiles are processed together, and
+    // each step is distributed.
     let units = num_tiles.div_ceil(UNIT_TILES);
     if units >= MIN_UNITS {
         let per_unit = num_tiles.div_ceil(units);

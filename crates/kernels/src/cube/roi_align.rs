@@ -4,8 +4,8 @@
 //! output (r, c, i, j) = mean over the bin's samples (y, x) of the bilinear feature (image of r, c, y, x)
 //! ```
 //!
-//! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. One difference: an image
-//! index beyond the batch means the last image, because a kernel cannot return an error.
+//! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. One difference: an invalid
+//! image index is rounded down and limited to the batch, because a kernel cannot return an error.
 
 use burn::backend::Cube;
 use burn::backend::ops::FloatTensorOps;
@@ -114,8 +114,8 @@ fn roi_align_kernel(
 }
 
 /// The samples of one bin along one axis that may lie on the map: the bin's start and length in feature pixels, the
-/// first sample, the number of samples that follow it, and the number of all samples, on the map and off it. There are
-/// none if a corner is not finite.
+/// first sample, the number of samples that follow it, and the number of all samples, on the map and off it. If a
+/// corner is not finite, no samples follow.
 #[cube]
 fn axis_samples(
     low: f32,

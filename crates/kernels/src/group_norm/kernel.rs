@@ -15,7 +15,7 @@ use crate::params::{Activation, GroupNormParams};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, widest};
 
-/// Pixels of a unit, summed in `f32` before they are added to an `f64`.
+/// Pixels of a unit, summed in `f32` before the sum is added to an `f64`.
 const CHUNK: usize = 256;
 
 /// Mean and inverse standard deviation of every group of every image, `[N, G, 2]`.
@@ -94,7 +94,7 @@ pub(crate) fn forward(
                     second - pixels * shift * shift + pixels * (pivot + shift - mean).powi(2)
                 })
                 .sum();
-            // Rounding must not make it negative; a NaN stays NaN.
+            // Rounding must not make the variance negative; a NaN stays NaN.
             let variance = squares / sizes.group_len();
             let variance = if variance < 0.0 { 0.0 } else { variance };
             [mean as f32, (1.0 / (variance + f64::from(params.epsilon)).sqrt()) as f32]
@@ -162,7 +162,7 @@ pub(crate) fn backward(
         let g = unsafe { std::slice::from_raw_parts(target.as_ptr().cast::<f32>(), range.len()) };
         add_grads(isa, g, &x[range], mean, of_g, of_gx);
     });
-    // SAFETY: the units together are all of it.
+    // SAFETY: the units together are all of the output.
     let masked = masked.map(|masked| unsafe { masked.into_vec() });
     let g = masked.as_deref().unwrap_or(output_grad);
 

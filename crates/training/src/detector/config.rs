@@ -30,8 +30,8 @@ pub struct TrainingConfig {
     pub validation: ValidationConfig,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
-    /// Wall-clock time for the whole run. The learning rate then follows the larger progress of steps and time, so
-    /// that a shortened run also ends with a low one. Runs shortened by it depend on the machine's speed.
+    /// Wall-clock time for the whole run. The learning rate then follows the larger progress of steps and time, so that
+    /// a shortened run also ends with a low one. Runs that the budget shortens depend on the machine's speed.
     pub time_budget: Option<Duration>,
     /// Seed of the samples, their order and every random choice of the losses.
     pub seed: u64,
@@ -72,8 +72,8 @@ pub struct EarlyStop {
     pub median_error_px: f64,
     /// Maximum median error, in degrees.
     pub median_error_degrees: f64,
-    /// Maximum ratio of false alarms to negatives; the number of false alarms is rounded up, because one of five
-    /// negatives is weak evidence.
+    /// Maximum ratio of false alarms to negatives; the allowed number of false alarms is rounded up, because one of
+    /// five negatives is weak evidence.
     pub false_alarm_rate: f64,
     /// Steps from the validation that was good enough to the end.
     pub cool_down: usize,

@@ -50,7 +50,7 @@ impl AugmentedCrops {
         (0..self.style.crops_per_scene).filter_map(|_| self.crop(&sample, &mut rng)).collect()
     }
 
-    /// A crop of a scene that [`scene`](Self::scene) never returns; `None` if the part is not visible.
+    /// A crop of a held-out scene, which [`scene`](Self::scene) never uses; `None` if the part is not visible.
     pub fn held_out(&self, scene_idx: u64) -> Option<LabelledCrop> {
         self.crop(&self.augmenter.held_out(scene_idx), &mut self.rng(Stream::HeldOut, scene_idx))
     }
@@ -77,7 +77,7 @@ mod tests {
     use sdg_demonstration::Annotation;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
-    /// Tolerance between the marked direction and the direction measured on a small, noisy crop.
+    /// Tolerance between the marked direction and the direction measured on a small crop.
     const DIRECTION_TOLERANCE_DEGREES: f64 = 8.0;
 
     /// A bar from red to green on dark grey, its grasp line from the red end to the green one.
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_label_is_what_the_crop_shows() {
         let mut style = OrientationTraining::edge(1).crops;
-        // Only the part on its own table, so that nothing else in the picture is red or green.
+        // The part on its own table with at most one distractor, so that little else in the picture is red or green.
         if let sdg_demonstration::AugmentationStyle::Scenes(scenes) = &mut style.augmentation.style {
             scenes.photo_background_share = 1.0;
             scenes.max_distractors = 1;

@@ -20,7 +20,7 @@ pub struct LabelledCrop {
 
 impl LabelledCrop {
     /// The crop of an object by a window rotated by `turn`, around a box with a small error; `None` if the object is
-    /// not visible. Windows are rotated only about objects with an outline.
+    /// not visible. For an object without an outline `turn` must be zero.
     pub fn of(
         object: &SampleObject,
         image: &RgbImage,

@@ -5,9 +5,9 @@
 //!   ─ logits ─ cross-entropy with a bell around the true angle ─ AdamW on one cycle ─ validation in degrees
 //! ```
 //!
-//! A composed scene costs more than its crops, so each gives several. Each window is rotated at random, which rotates
-//! the part in the crop: the same scene teaches several angles. The box of a rotated window is recomputed from the
-//! part's outline, like the box of a detector.
+//! A composed scene costs more time than its crops, so each scene gives several crops. Each window is rotated at
+//! random, which rotates the part in the crop: the same scene teaches several angles. The box of a rotated window is
+//! recomputed from the part's outline, like the box of a detector.
 //!
 //! # Measured
 //!

@@ -14,7 +14,7 @@ use sdg_orientation::{Labels, OrientationCnn, crop_batch};
 use super::labelled_crop::LabelledCrop;
 use crate::error::TrainingError;
 
-/// The standard deviation, in classes, of the bell by which crops near a class are weighted.
+/// The bell by which crops near a class are weighted, with its standard deviation in classes.
 const BELL: Labels = Labels::VonMises { sigma_classes: 4.0 };
 
 /// Number of crops evaluated at a time.
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn classes_of_crops_read_the_angle_before_anything_is_taught() {
-        // Even features of an untrained network differ from turn to turn.
+        // Even the features of an untrained network differ from angle to angle.
         let crops: Vec<LabelledCrop> = (0..240).map(|i| crop(1.5 * f64::from(i))).collect();
         let fresh = config().init(&burn::tensor::Device::flex(), 9).unwrap();
         let untaught = fresh.predict(&crops[10].crop).unwrap();

@@ -70,7 +70,7 @@ const NUM_CLASS_CROPS: usize = 960;
 /// is, and its errors show whether it is useful.
 ///
 /// # Errors
-/// An invalid setting, a demonstration without a grasp line, pretrained parameters of another network, a loss that is
+/// An invalid setting, the errors of [`AugmentedCrops::new`], pretrained parameters of another network, a loss that is
 /// not finite.
 pub fn teach(
     demonstrations: &[Demonstration],

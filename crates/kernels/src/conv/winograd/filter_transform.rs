@@ -44,7 +44,8 @@ unsafe fn filter_line_adjoint<L: Lanes>(u: [L; 6]) -> [L; 3] {
     }
 }
 
-/// `G g Gᵀ` of a panel of weights `[channels, 9, 32]`, rows `width` floats long, to `target` at every frequency.
+/// `G g Gᵀ` of the first `width` columns of a panel of weights `[channels, 9, 32]`, written to `target` at every
+/// frequency.
 ///
 /// # Safety
 /// `target` has room for `channels · width` floats at each frequency, which are `step` apart.
@@ -111,7 +112,7 @@ unsafe fn filter_lanes<L: Lanes>(
     }
 }
 
-/// `Gᵀ ū G` of sixteen filters and all channels: `[channels, 9, 16]` from `[36, channels, M]`.
+/// `Gᵀ ū G` of sixteen filters and all channels: `[channels, 9, 16]` from `[36, channels, Co]`.
 ///
 /// # Safety
 /// `source` has sixteen readable floats at every frequency and channel.
@@ -124,7 +125,7 @@ pub(super) unsafe fn filter_transform_adjoint(
     target: &mut [f32],
 ) {
     assert!(target.len() >= channels * 9 * LANES);
-    // SAFETY: the panel's length was asserted; the source is the caller's promise.
+    // SAFETY: the target's length was asserted; the source is the caller's promise.
     unsafe { filter_gradient_panel(isa, source, step, channels, channel_step, target.as_mut_ptr()) };
 }
 

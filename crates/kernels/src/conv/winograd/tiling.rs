@@ -38,7 +38,7 @@ impl Tiling {
 
 /// Transformed values of some tiles, `[36, tiles, C]`.
 ///
-/// A line of floats separates frequencies: otherwise powers of two would put a tile's 36 values into one set of
+/// A cache line of floats separates frequencies: otherwise powers of two would put a tile's 36 values into one set of
 /// the cache.
 pub(super) struct Frequencies {
     pub(super) values: Scratch,

@@ -224,7 +224,7 @@ unsafe fn output_transform_adjoint_lanes<L: Lanes>(
     }
 }
 
-/// The positions of a tile's pixels; entries outside the maps are not changed.
+/// Sets pointers to a tile's pixels; entries outside the maps are not changed.
 #[inline(always)]
 fn point_at_pixels<const SIDE: usize>(
     pixels: &mut [[*const f32; SIDE]; SIDE],

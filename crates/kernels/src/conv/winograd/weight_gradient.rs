@@ -14,9 +14,9 @@ use crate::simd::{Isa, transpose};
 /// Maximum size of a gradient in the frequency domain for which every chunk of tiles has its own sums: somewhat
 /// more than 36 · 64 · 64 floats.
 const OWN_GRADIENT: usize = 160 << 10;
-/// Chunks of tiles, each summed separately.
+/// Maximum number of chunks of tiles, each summed separately.
 const CHUNKS: usize = 8;
-/// Number of tiles transformed before they are multiplied, if a chunk works alone.
+/// Number of tiles transformed before they are multiplied, if one thread computes a chunk.
 const BLOCK_TILES: usize = 96;
 /// Floats of the transformed values of a block, if all threads work on it together: 12 MB.
 const BLOCK_FLOATS: usize = 3 << 20;
@@ -104,7 +104,7 @@ impl Sums<'_> {
         let most = block.min(tiles.len());
         let mut transformed_input = Frequencies::new(most, rows);
         let mut transformed_gradient = Frequencies::new(most, columns);
-        // Number of rows of a product that are processed together, so that small products are also distributed.
+        // Number of groups into which the rows of a product are divided, so that large products are also distributed.
         let row_groups = if shared_out { (rows / 96).max(1) } else { 1 };
         let mut start = tiles.start;
         while start < tiles.end {
