@@ -2,7 +2,7 @@
 
 CARGO ?= cargo
 # One profile for tests and runs, so a fresh machine compiles burn only once.
-PROFILE := --release
+RELEASE := --release
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage
@@ -29,10 +29,10 @@ site: setup web ## Builds the site of all guides into target/site (mdBook from i
 test-site: site ## Checks the built site: links, anchors, nothing from elsewhere, size, axe-core at 390 px and on a desk
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	$(CARGO) test $(PROFILE) --locked --workspace --test checks -- --ignored site::
+	$(CARGO) test $(RELEASE) --locked --workspace --test checks -- --ignored site::
 
 test-guides: setup ## Runs the guides' commands, those that take long too
-	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture guides::
+	$(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --nocapture guides::
 
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
@@ -55,36 +55,36 @@ TESTS_ALONE = --lib --bins --tests
 
 test-compile: setup ## Compiles every test
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		$(CARGO) nextest run $(PROFILE) --locked --workspace $(TESTS_ALONE) --no-run; \
+		$(CARGO) nextest run $(RELEASE) --locked --workspace $(TESTS_ALONE) --no-run; \
 	else \
-		$(CARGO) test $(PROFILE) --locked --workspace $(TESTS_ALONE) --no-run; \
+		$(CARGO) test $(RELEASE) --locked --workspace $(TESTS_ALONE) --no-run; \
 	fi
 
 # Uses nextest if it is installed, otherwise cargo's own runner. nextest does not run the examples in the docs.
 test: setup ## Runs every test
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		$(CARGO) nextest run $(PROFILE) --locked --workspace $(TESTS_ALONE); \
+		$(CARGO) nextest run $(RELEASE) --locked --workspace $(TESTS_ALONE); \
 	else \
-		$(CARGO) test $(PROFILE) --locked --workspace $(TESTS_ALONE); \
+		$(CARGO) test $(RELEASE) --locked --workspace $(TESTS_ALONE); \
 	fi
-	@$(CARGO) test $(PROFILE) --locked --workspace --doc -q
+	@$(CARGO) test $(RELEASE) --locked --workspace --doc -q
 
 # Tests marked as needing Chromium; screenshots stay in target/browser-test.
 test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --test-threads 1 browser:: --skip film::
-	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
+	$(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --test-threads 1 browser:: --skip film::
+	$(CARGO) test $(RELEASE) --locked --workspace --test browser -- --ignored --test-threads 1
 
 film: build ## Makes the pictures of the front page, the tour and the gallery, datasets/pictures
 	@scripts/install.sh chromium chromium-driver
-	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored film:: gallery::
+	$(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored film:: gallery::
 
 # A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 if the part looks the same after half a turn.
 walk: build ## Times the way from a photo to a tried model, through the page in Chromium (SETS="FOLDER …")
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture walk::
+	SDG_WALK="$(SETS)" $(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --nocapture walk::
 
 # A run without TUNED=1 looks at the reported side: record it in docs/decisions/025-acceptance.md.
 MODELS ?= S
@@ -135,7 +135,7 @@ coverage: setup ## Lines and regions of robot, fci and kinematics that tests rea
 	@scripts/coverage.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
-DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
+DEVICE_TESTS = $(CARGO) test $(RELEASE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
 
 network-grasps: setup ## Grasps of all parts over TCP and UDP, compared with the same in one process, in lockstep and in real time (NETWORK_GRASPS=5: fewer)
 	@scripts/network-grasps.sh
@@ -162,7 +162,7 @@ SDG_TORCH_PYTHON ?= $(CURDIR)/target/bench/venv/bin/python
 
 test-torch: setup ## Tests a whole network against torchvision, losses and gradients included
 	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
-	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked --workspace --test detection -- --ignored golden::
+	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(RELEASE) --locked --workspace --test detection -- --ignored golden::
 
 # The libraries for other programs, and their dependencies. Nothing is published, or compiled again, because the tests compile the same code.
 PACKAGED = geometry picture kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
@@ -177,8 +177,8 @@ FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weigh
 lint: setup ## Spelling, formatting and lints, with every feature, as CI denies them
 	@scripts/spelling.sh
 	$(CARGO) fmt --all --check
-	DOCS_RS=1 $(CARGO) clippy $(PROFILE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
-	$(CARGO) clippy $(PROFILE) --locked --package sdg-cli --no-default-features --all-targets -- -D warnings
+	DOCS_RS=1 $(CARGO) clippy $(RELEASE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
+	$(CARGO) clippy $(RELEASE) --locked --package sdg-cli --no-default-features --all-targets -- -D warnings
 
 deny: setup ## Licences and sources of all dependencies, and advisories where their database can be reached (ADVISORIES=FOLDER: a clone of it)
 	@ADVISORIES="$(ADVISORIES)" scripts/deny.sh
@@ -187,7 +187,7 @@ deny: setup ## Licences and sources of all dependencies, and advisories where th
 DEVICE ?= flex
 BASE_WEIGHTS := target/base-weights
 base-weights: setup ## Pretrains preset edge on generated parts (hours; continues where it was stopped)
-	$(CARGO) build $(PROFILE) --locked --workspace --bin sdg-base-weights --features sdg-base-weights/$(DEVICE)
+	$(CARGO) build $(RELEASE) --locked --workspace --bin sdg-base-weights --features sdg-base-weights/$(DEVICE)
 	mkdir -p $(BASE_WEIGHTS)
 	target/release/sdg-base-weights pretrain --checkpoint $(BASE_WEIGHTS)/detector.safetensors --device $(DEVICE)
 	target/release/sdg-base-weights pretrain --network orientation --steps 3000 \
@@ -223,7 +223,7 @@ bench-browser: web ## The page's speed against onnxruntime-web in headless Chrom
 
 # Installs PyPI's ompl in target/plan-peers. Takes a quarter of an hour on two cores.
 bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks a second, and OMPL on the same model
-	$(CARGO) build $(PROFILE) --locked --workspace --example planning
+	$(CARGO) build $(RELEASE) --locked --workspace --example planning
 	target/release/examples/planning rate
 	target/release/examples/planning proof 1000
 	[ -x target/plan-peers/bin/python ] || python3 -m venv target/plan-peers
