@@ -9,8 +9,7 @@ use sdg_cell::Perception;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
 };
-use sdg_geometry::Polygon;
-use sdg_grasp::{GraspDetection, GraspModel, Verification};
+use sdg_grasp::{GraspModel, Verification, without_unmarked_parts};
 use serde_json::{Value, json};
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
@@ -59,27 +58,6 @@ pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
     annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
 }
 
-/// Removes unmarked parts from the photos, as detected by the model; also returns the number of removed parts.
-///
-/// The photos are the background of the samples, so unmarked parts in them would count as wrong detections. Marked
-/// parts are already removed.
-fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
-    let mut num_others = 0;
-    let mut alone = Vec::with_capacity(demonstrations.len());
-    for demonstration in demonstrations {
-        let detections = model.detect(&demonstration.image, Verification::ByShape)?;
-        let marked = demonstration.annotation.bbox;
-        let others = detections.iter().filter(|found| found.is_accepted() && !marked.contains(&found.bbox.center()));
-        let region = |found: &GraspDetection| {
-            found.outline.clone().unwrap_or_else(|| Polygon { vertices: found.bbox.corners().to_vec() })
-        };
-        let regions: Vec<Polygon> = others.map(region).collect();
-        num_others += regions.len();
-        alone.push(demonstration.clone().without(&regions));
-    }
-    Ok((alone, num_others))
-}
-
 /// Results of a model on its held-out samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldBackFigures {
@@ -102,7 +80,7 @@ impl HeldBackFigures {
         let model = &model.clone().with_region(None)?;
         let facts = model.facts();
         let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
-        let (alone, others_in_photo) = without_others(model, demonstrations)?;
+        let (alone, others_in_photo) = without_unmarked_parts(model, demonstrations)?;
         let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
         let detector = Perception::of_any_camera(model.clone());

@@ -128,7 +128,10 @@ pub use sdg_training::{Ending, HIT_DEGREES, HIT_PX, History, LossValues, StepRec
 pub use taught::TaughtDemonstration;
 pub use taught_marks::TaughtMarks;
 #[cfg(feature = "teach")]
-pub use teach::{FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, check_teaching_region, teach};
+pub use teach::{
+    FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, check_teaching_region, teach,
+    without_unmarked_parts,
+};
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
 

@@ -130,6 +130,7 @@ fn teaching_goes_the_same_way() {
         let mut losses = Vec::new();
         let taught = teach_network(
             &[demonstration()],
+            &[demonstration()],
             &small_plan(&options),
             &options,
             &mut |event| {

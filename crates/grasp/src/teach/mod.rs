@@ -29,6 +29,7 @@ mod start;
 pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
+mod unmarked;
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -40,6 +41,7 @@ use sdg_geometry::GraspLine;
 use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, ValidationRecord, first_windows, train};
 
+use crate::check_config::ScoreConfig;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
@@ -64,6 +66,7 @@ pub use preset::Preset;
 use side_by_side::side_by_side;
 pub use start::Start;
 use symmetry::HiddenTurns;
+pub use unmarked::without_unmarked_parts;
 
 /// A model and the run that made it.
 #[derive(Debug, Clone)]
@@ -95,14 +98,22 @@ pub fn teach(
         check_teaching_region(demonstrations, options)?;
     }
     let options = options.with_start_read()?;
+    let mut by_search = without_network(demonstrations, &options)?;
+    let (alone, _) = without_unmarked_parts(&by_search, demonstrations)?;
     let mut taught = match Plan::new(&options) {
-        Some(plan) => teach_network(demonstrations, &plan, &options, observe, start)?,
-        None => without_network(demonstrations, &options, start)?,
+        Some(plan) => teach_network(demonstrations, &alone, &plan, &options, observe, start)?,
+        None => {
+            by_search.score_calibration.resemblance =
+                NegativeScenes::new(&alone, options.seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?
+                    .observe(None)?
+                    .resemblance();
+            Taught { model: by_search, history: None }
+        }
     };
     if !options.negatives.is_empty() {
         taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
-        taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
     }
+    taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
     taught.model = taught.model.with_region(options.region)?;
     Ok(taught)
 }
@@ -187,17 +198,17 @@ fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Ve
     demonstrations.iter().map(with_tolerance).collect()
 }
 
-/// Model S: the demonstrations alone.
-fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
-    let resemblance = NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?
-        .observe(None)?
-        .resemblance();
-    let demonstrations = taught(demonstrations, options)?;
-    let model = GraspModel {
+/// Model S, which is the demonstrations alone, with a neutral resemblance of other objects.
+fn without_network(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<GraspModel> {
+    Ok(GraspModel {
         preset: options.preset.name().to_owned(),
         network: None,
-        demonstrations,
-        score_calibration: ScoreCalibration { network: NetworkCalibration::NEUTRAL, evidence: None, resemblance },
+        demonstrations: taught(demonstrations, options)?,
+        score_calibration: ScoreCalibration {
+            network: NetworkCalibration::NEUTRAL,
+            evidence: None,
+            resemblance: ScoreConfig::DEFAULT.resemblance.neutral,
+        },
         facts: TeachingFacts {
             seed: options.seed,
             symmetry: options.symmetry,
@@ -206,22 +217,23 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
             region: None,
             samples: 0,
             steps: 0,
-            seconds: decimal(start.elapsed().as_secs_f64()),
+            seconds: 0.0,
             validation: None,
             orientation: None,
             negatives: None,
             base_weights_sha256: None,
         },
-    };
-    Ok(Taught { model, history: None })
+    })
 }
 
 /// Number of windows from which the last layers of our base weights are computed before training.
 const NUM_VIEWS: usize = 64;
 
-/// Teaches a model with a network by a plan.
+/// Teaches a model with a network by a plan. Samples are made from `alone`, the photos of the demonstrations without
+/// unmarked parts.
 pub(crate) fn teach_network(
     demonstrations: &[Demonstration],
+    alone: &[Demonstration],
     plan: &Plan,
     options: &TeachOptions,
     observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
@@ -237,7 +249,7 @@ pub(crate) fn teach_network(
     let mut orientation_facts = None;
     let reading = match &plan.reading {
         ReadingPlan::BoxAndCrop(orientation_plan) => {
-            let (network, facts) = orientation::teach(demonstrations, orientation_plan, options, observe)?;
+            let (network, facts) = orientation::teach(alone, orientation_plan, options, observe)?;
             orientation_facts = Some(facts);
             Reading::BoxAndCrop(Box::new(network))
         }
@@ -246,12 +258,12 @@ pub(crate) fn teach_network(
         ReadingPlan::Mask => Reading::Mask(MaskMatcher::new(&taught)?),
     };
 
-    let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
-    let held_back_augmenter = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
+    let augmenter = Augmenter::new(alone, plan.samples.clone(), options.seed)?;
+    let held_back_augmenter = Augmenter::new(alone, plan.held_back.clone(), options.seed)?;
     let [to_learn, to_hold_back] = other_parts::draw(plan.num_other_parts, options.seed);
     let augmenter = augmenter.with_other_parts(&to_learn)?;
     let held_back_augmenter = held_back_augmenter.with_other_parts(&to_hold_back)?;
-    let turns = HiddenTurns::new(demonstrations, options.symmetry);
+    let turns = HiddenTurns::new(alone, options.symmetry);
     let numbers: Vec<u64> = (0..plan.training.validation.samples as u64).collect();
     let held_back = side_by_side(&numbers, |&number| Ok(turns.canonical(held_back_augmenter.held_out(number))))?;
     let held_back = HeldBack { samples: &held_back, turns: &turns };
@@ -301,7 +313,7 @@ pub(crate) fn teach_network(
         &mut |event| observe(&TeachingEvent::from(*event)),
     )?;
     let network = finished(&detector)?;
-    let mut on_other_parts = other_parts::shown(demonstrations, &to_hold_back, &network, options.seed)?;
+    let mut on_other_parts = other_parts::shown(alone, &to_hold_back, &network, options.seed)?;
     on_other_parts.highest.extend(absent::highest_scores(&network, &of_any_size, &options.negatives)?);
     let is_kept = |(record, _): &(&ValidationRecord, &Vec<Proposals>)| record.steps_done == history.best.steps_done;
     let Some((_, proposals)) = history.validations.iter().zip(&proposed).find(is_kept) else {
@@ -313,7 +325,7 @@ pub(crate) fn teach_network(
     if (hits as f64) < plan.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
-    let negatives = NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES)?;
+    let negatives = NegativeScenes::new(alone, options.seed, NUM_NEGATIVE_SCENES)?;
     let others = negatives.observe(Some(&network))?;
     let elsewhere: Vec<f64> = calibrated
         .elsewhere

@@ -85,6 +85,7 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
     let options = TeachOptions { kind, preset, ..TeachOptions::new(1) };
     teach_network(
         &[demonstration()],
+        &[demonstration()],
         &small_plan(&options),
         &options,
         &mut |_| ControlFlow::Continue(()),
@@ -236,7 +237,8 @@ fn an_interrupt_before_there_is_a_network_leaves_nothing() {
         let options = TeachOptions { kind, ..TeachOptions::new(1) };
         let plan = small_plan(&options);
         let stop = &mut |_: &TeachingEvent| ControlFlow::Break(());
-        let refused = teach_network(&[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
+        let refused =
+            teach_network(&[demonstration()], &[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
         assert!(refused.to_string().contains(reason), "{refused}");
     }
 }
