@@ -242,8 +242,9 @@ def teach(
     mark_height_mm: Optional[float] = None,
     grasp_height_mm: Optional[float] = None,
     negatives: Sequence[_Path] = (),
+    more_demos: Sequence[tuple[_Path, Union[_Path, Mapping[str, Any]]]] = (),
 ) -> GraspModel:
-    """Teaches a model from one photo, with the defaults of `sdg teach`. Ctrl-C ends the teaching.
+    """Teaches a model from one photo or several, with the defaults of `sdg teach`. Ctrl-C ends the teaching.
 
     photo: the file of the photo.
     marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file as a dictionary.
@@ -256,6 +257,7 @@ def teach(
     mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a camera; grasp_height_mm defaults
     to half of mark_height_mm.
     negatives: files of pictures without the part.
+    more_demos: further photos of the part, each with its marks, like photo and marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """
@@ -286,14 +288,16 @@ def teach(
         )
     bounds = None if region is None else _bounds(region)
     with tempfile.TemporaryDirectory() as folder:
-        marks_file: _Path
-        if isinstance(marks, Mapping):
-            marks_file = Path(folder, f"{Path(fspath(photo)).stem}.json")
-            marks_file.write_text(json.dumps(marks), encoding="utf-8")
-        else:
-            marks_file = marks
+        demonstrations: list[tuple[_Path, _Path]] = []
+        for of_photo, of_marks in [(photo, marks), *more_demos]:
+            if isinstance(of_marks, Mapping):
+                marks_file = Path(folder, str(len(demonstrations)), f"{Path(fspath(of_photo)).stem}.json")
+                marks_file.parent.mkdir()
+                marks_file.write_text(json.dumps(of_marks), encoding="utf-8")
+                of_marks = marks_file
+            demonstrations.append((of_photo, of_marks))
         taught = _native.teach(
-            [(photo, marks_file)],
+            demonstrations,
             model,
             preset,
             seed,

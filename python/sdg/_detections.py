@@ -50,8 +50,10 @@ class Detection:
     """Left, upper, right and lower edge, in pixels."""
     polygon: list[tuple[float, float]]
     """The outline's corners, in pixels."""
+    jaws_touch: list[int]
+    """Indices, among all detections of the picture by score, of accepted parts that the jaws would touch."""
     record: dict[str, Any] = field(repr=False)
-    """The complete record of `sdg detect --json`, with all digits."""
+    """The record of `sdg detect --json`, with all digits; it lacks only `advice`, which names options of the program."""
 
     @classmethod
     def of(cls, record: dict[str, Any]) -> "Detection":
@@ -86,6 +88,7 @@ def _fields(record: dict[str, Any]) -> dict[str, Any]:
         "refused": record.get("refused"),
         "box": tuple(record["box"]),
         "polygon": [(x, y) for x, y in record.get("polygon", [])],
+        "jaws_touch": record.get("jaws_touch", []),
         "record": record,
     }
 

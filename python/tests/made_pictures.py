@@ -52,3 +52,13 @@ def pictures_of_part() -> dict[str, Picture]:
     }
     others = {name: sdg.read_picture(DEMONSTRATIONS / name / "image.png") for name in ("key", "pliers")}
     return {**of_part, **others}
+
+
+def touching() -> Picture:
+    """Two parts so close that the jaws at each would touch the other."""
+    photo = sdg.read_picture(PHOTO)
+    picture = photo.copy()
+    table = np.median(photo, axis=(0, 1))
+    rows, columns = np.nonzero(np.abs(photo - table).sum(axis=2)[150:300, 240:400] > 60)
+    picture[rows + 100, columns + 240] = photo[rows + 150, columns + 240]
+    return picture

@@ -107,6 +107,33 @@ def without_seconds_of_teaching(file: Path) -> tuple[str, bytes]:
     return header.rstrip(), content[8 + length :]
 
 
+def test_parts_that_the_jaws_would_touch_are_the_program_s(
+    shape_model: sdg.GraspModel, models: dict[str, Path], sdg_program: Path, tmp_path: Path
+) -> None:
+    picture = made_pictures.touching()
+    made_pictures.write_png(tmp_path / "touching.png", picture)
+    line, *_ = output(sdg_program, "detect", "--grasp-model", models["S"], "--json", tmp_path / "touching.png")
+    printed = [one.get("jaws_touch", []) for one in json.loads(line)["detections"]]
+    assert [one.jaws_touch for one in shape_model.detect(picture)] == printed == [[1], [0]]
+
+
+def test_several_photos_are_taught_as_by_the_program(sdg_program: Path, tmp_path: Path) -> None:
+    turned = tmp_path / "turned.png"
+    made_pictures.write_png(turned, sdg.read_picture(made_pictures.PHOTO)[::-1, ::-1])
+    marks = json.loads(Path(made_pictures.MARKS).read_text(encoding="utf-8"))
+    marks["imagePath"] = turned.name
+    for shape in marks["shapes"]:
+        shape["points"] = [[marks["imageWidth"] - x, marks["imageHeight"] - y] for x, y in shape["points"]]
+    file = tmp_path / "turned.json"
+    file.write_text(json.dumps(marks), encoding="utf-8")
+    taught = sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, model="S", more_demos=[(turned, marks)])
+    taught.save(tmp_path / "python.sdg")
+    demos = ["--demo", f"{made_pictures.PHOTO}:{made_pictures.MARKS}", "--demo", f"{turned}:{file}"]
+    output(sdg_program, "teach", *demos, "--model", "S", "--out", tmp_path / "program.sdg")
+    of_both = [without_seconds_of_teaching(tmp_path / name) for name in ("python.sdg", "program.sdg")]
+    assert of_both[0] == of_both[1]
+
+
 def test_strides_channels_and_grey_are_the_same_pixels(shape_model: sdg.GraspModel) -> None:
     photo = sdg.read_picture(made_pictures.PHOTO)
     expected = shape_model.detect(photo)

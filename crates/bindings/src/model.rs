@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use image::RgbImage;
-use sdg_cell::{DEFAULT_MIN_SCORE, FoundRecord, Perception};
+use sdg_cell::{DEFAULT_MIN_SCORE, Found, FoundRecord, Perception};
 use sdg_grasp::{Device, GraspModel, SearchRegion, Verification};
 use sdg_inputs::check_replaces_a_model;
 use serde::Serialize;
@@ -78,6 +78,9 @@ pub struct Record {
     /// The part's size relative to its nominal size; absent with a camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
+    /// Indices, in the list of all detections, of accepted parts that the jaws of this accepted one would touch.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub jaws_touch: Vec<usize>,
 }
 
 impl Model {
@@ -118,11 +121,14 @@ impl Model {
             let perception = self.perception(view.camera.as_ref(), view.region)?;
             let found = perception.detect(picture, Verification::ByShape)?;
             let size = picture.dimensions().into();
-            let record = |found| Record {
+            let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
+            let touched = perception.touched_among_accepted(&detections, DEFAULT_MIN_SCORE);
+            let record = |(found, jaws_touch): (&Found, Vec<usize>)| Record {
                 found: FoundRecord::new(found, &perception),
                 size: perception.size_of(&found.detection, size),
+                jaws_touch,
             };
-            Ok(Detections { records: found.iter().map(record).collect() })
+            Ok(Detections { records: found.iter().zip(touched).map(record).collect() })
         })?
     }
 

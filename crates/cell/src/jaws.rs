@@ -61,6 +61,18 @@ fn region(detection: &GraspDetection) -> Polygon {
 }
 
 impl Perception {
+    /// As [`Self::touched_by_jaws`] for the detections with at least `min_score`; the others touch nothing and are not
+    /// touched.
+    pub fn touched_among_accepted(&self, detections: &[&GraspDetection], min_score: f64) -> Vec<Vec<usize>> {
+        let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| detections[idx].score >= min_score).collect();
+        let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();
+        let mut touched = vec![Vec::new(); detections.len()];
+        for (&idx, others) in accepted.iter().zip(self.touched_by_jaws(&among)) {
+            touched[idx] = others.into_iter().map(|other| accepted[other]).collect();
+        }
+        touched
+    }
+
     /// For each detection in a picture, in order, the indices of the detections whose parts its jaws touch. If the
     /// camera's pose is known, fingers have the size of the Franka hand's; otherwise they are as wide as the marked
     /// line is long.

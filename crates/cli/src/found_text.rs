@@ -82,13 +82,7 @@ impl Wording<'_> {
     /// For each detection, the indices of the detections whose parts its jaws would touch. Only accepted detections are
     /// compared.
     pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
-        let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| self.is_accepted(detections[idx])).collect();
-        let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();
-        let mut touched = vec![Vec::new(); detections.len()];
-        for (&idx, others) in accepted.iter().zip(self.detector.touched_by_jaws(&among)) {
-            touched[idx] = others.into_iter().map(|other| accepted[other]).collect();
-        }
-        touched
+        self.detector.touched_among_accepted(detections, self.min_score)
     }
 
     fn doubtful(&self, text: &str) -> String {
