@@ -93,7 +93,7 @@ impl Model {
         })
     }
 
-    /// Writes the model file atomically; it replaces only an existing grasp model.
+    /// Writes the model file atomically. An existing file is replaced only if it is a grasp model.
     ///
     /// # Errors
     /// The path is a file of another kind, or cannot be written.
@@ -111,8 +111,8 @@ impl Model {
     ///
     /// # Errors
     /// The errors of [`Self::perception`]; the picture's size differs from the camera's, or the region is not inside
-    /// it; the number of threads is invalid, or the system refuses them; the process was forked from one with threads
-    /// of this library.
+    /// the picture; the number of threads is invalid, or the system refuses them; the process was forked from one with
+    /// threads of this library.
     pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
         on_threads(view.threads, || {
             let perception = self.perception(view.camera.as_ref(), view.region)?;

@@ -53,7 +53,7 @@ impl Ground {
         inside.then(|| cell.y as usize * WIDTH + cell.x as usize)
     }
 
-    /// The object that a distractor at a place would overlap; if there are several, the part has priority.
+    /// The object that a distractor at a pose would overlap; if there are several, the part has priority.
     fn under(&self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>) -> Cell {
         let mut found = Cell::Free;
         for point in points {

@@ -53,7 +53,7 @@ struct Slide {
     part: PlacedObject,
     part_map: HeightMap,
     cover_map: HeightMap,
-    /// The position of the cover's centre at the end of its path, in the base frame, and its direction.
+    /// The position of the cover's centre at the end of its path, in the base frame.
     end: Point2<f64>,
     camera: Vector3<f64>,
     cover_middle_m: f64,

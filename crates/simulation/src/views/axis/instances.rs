@@ -15,9 +15,9 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Number of instances of the part.
 const NUM_INSTANCES: usize = 3;
 
-/// Number of places tried for one instance.
+/// Number of poses tried for one instance.
 const TRIES_PER_INSTANCE: usize = 60;
-/// Maximum number of restarts.
+/// Maximum number of attempts to place all instances.
 const MAX_ROUNDS: usize = 60;
 
 /// An ordinary scene with two more instances of the part and up to three distractors.
