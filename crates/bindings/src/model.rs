@@ -129,8 +129,8 @@ impl Model {
     /// The model's perception with a camera, or for pictures of any camera.
     ///
     /// # Errors
-    /// The region is empty, lies outside the camera's pictures, or is too small for the part; or a camera is given that
-    /// does not see the plane of the marks, or to a model that was taught without one.
+    /// The region is empty, lies outside the camera's pictures, or is too small for the part. With a camera: the
+    /// camera's pictures do not show the plane of the marks, or the model was taught without a camera.
     pub fn perception(&self, camera: Option<&Camera>, region: RegionChoice) -> Result<Arc<Perception>> {
         let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {

@@ -102,7 +102,7 @@ pub enum OnTable {
 pub struct OtherView {
     /// The picture and its camera.
     pub view: CameraView,
-    /// Ground truth of the part; `None` if another object is in its place.
+    /// Ground truth of the part; `None` if another object is shown instead.
     pub truth: Option<GraspTruth>,
     /// Height of the camera above the table, in metres.
     pub height_m: f64,

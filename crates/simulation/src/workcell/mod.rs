@@ -117,7 +117,7 @@ impl Workcell {
         &self.config
     }
 
-    /// Resets everything to the start: part and distractors at their places, the arm at rest at `q`
+    /// Resets everything to the start: part and distractors at their start poses, the arm at rest at `q`
     /// with its hand open.
     ///
     /// # Errors

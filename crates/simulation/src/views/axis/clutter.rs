@@ -133,8 +133,8 @@ pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Pushes a distractor from a distance towards a place until it touches an object; returns its position and the touched
-/// object.
+/// Pushes a distractor from a distance towards a point until it touches an object; returns the distractor's pose and
+/// the touched object.
 fn pushed(
     ground: &Ground,
     points: &[Point2<f64>],

@@ -44,7 +44,7 @@ pub(super) fn draw_three(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Instances at random places with a distance between them; `None` if one finds no room.
+/// Instances at random poses with a distance between them; `None` if there is no room for one of them.
 fn placed_apart(request: &mut Request<'_>, config: &VariationConfig) -> Option<Vec<PlacedObject>> {
     let rng = &mut request.rng;
     let mut taken: Vec<Vec<Point2<f64>>> = Vec::new();
