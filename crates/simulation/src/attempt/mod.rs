@@ -1,5 +1,5 @@
-//! One grasp attempt: the grasp sequence (`sdg_robot::grasp`) from a random start, judged by the true state at every
-//! step.
+//! One grasp attempt: the grasp sequence (`sdg_robot::grasp`) from a random start, judged by the true state after
+//! closing, lifting and holding.
 
 mod judge;
 mod report;
