@@ -96,7 +96,7 @@ impl Model {
         })
     }
 
-    /// Writes the model file atomically; it replaces only an existing grasp model.
+    /// Writes the model file atomically. An existing file is replaced only if it is a grasp model.
     ///
     /// # Errors
     /// The path is a file of another kind, or cannot be written.
@@ -114,8 +114,8 @@ impl Model {
     ///
     /// # Errors
     /// The errors of [`Self::perception`]; the picture's size differs from the camera's, or the region is not inside
-    /// it; the number of threads is invalid, or the system refuses them; the process was forked from one with threads
-    /// of this library.
+    /// the picture; the number of threads is invalid, or the system refuses them; the process was forked from one with
+    /// threads of this library.
     pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
         on_threads(view.threads, || {
             let perception = self.perception(view.camera.as_ref(), view.region)?;
@@ -135,8 +135,8 @@ impl Model {
     /// The model's perception with a camera, or for pictures of any camera.
     ///
     /// # Errors
-    /// The region is empty, lies outside the camera's pictures, or is too small for the part; or a camera is given that
-    /// does not see the plane of the marks, or to a model that was taught without one.
+    /// The region is empty, lies outside the camera's pictures, or is too small for the part. With a camera: the
+    /// camera's pictures do not show the plane of the marks, or the model was taught without a camera.
     pub fn perception(&self, camera: Option<&Camera>, region: RegionChoice) -> Result<Arc<Perception>> {
         let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {

@@ -48,7 +48,8 @@ impl Tracker {
     /// any fixed time.
     ///
     /// # Errors
-    /// The time is before that of the last frame, or the picture's size differs from the camera's.
+    /// The time is before that of the last frame, the picture's size differs from the camera's, or the region is not
+    /// inside the picture; a search fails; the errors of threads as for [`Model::detect`].
     pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
         let Some(captured) =
             Duration::try_from_secs_f64(captured_secs).ok().filter(|_| captured_secs >= self.last_secs)

@@ -273,7 +273,7 @@ size_t sdg_last_error(char *buffer, size_t num_bytes);
 /* Reads the file of a grasp model. */
 sdg_status sdg_model_load(const char *file, sdg_handle *model);
 
-/* Writes a model's file atomically. It replaces only an existing grasp model. */
+/* Writes a model's file atomically. An existing file is replaced only if it is a grasp model. */
 sdg_status sdg_model_save(sdg_handle model, const char *file);
 
 /* Teaches a model like `sdg teach`, on all cores, which takes seconds or minutes. */

@@ -45,7 +45,7 @@ pub unsafe extern "C" fn sdg_model_load(file: *const c_char, model: *mut sdg_han
     status(|| unsafe { give(model, "model", || Ok(Object::Model(Arc::new(Model::read(path(file, "file")?)?)))) })
 }
 
-/// Writes a model's file atomically. It replaces only an existing grasp model.
+/// Writes a model's file atomically. An existing file is replaced only if it is a grasp model.
 ///
 /// # Safety
 /// `file` is null or zero-terminated.

@@ -23,7 +23,7 @@ use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 /// Maximum wait for a picture taken after the arm stopped.
 const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// A picture, and its capture time if a clock measures time.
+/// A picture, and its capture time unless time is simulated.
 #[derive(Debug, Clone)]
 pub struct TakenPicture {
     /// The picture.
@@ -104,7 +104,8 @@ pub struct ModelFinder<P> {
     pub places: Vec<Place>,
 }
 
-/// A picture and its parts, each with its outline in the plane at [`Sighting::middle_m`], in the base frame, in metres.
+/// A picture and its parts, each with its outline (base frame, in metres) in the plane at the height of
+/// [`Sighting::middle_m`].
 #[derive(Debug)]
 struct Sights {
     picture: PosedPicture,
@@ -125,7 +126,7 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 const TOP_LEEWAY_M: f64 = 0.002;
 /// Number of standard deviations around the expected height in which the surface below a part is searched.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Minimum and maximum of the searched distance, in metres.
+/// Minimum and maximum of the distance from the expected height within which the surface is searched, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;

@@ -1,4 +1,4 @@
-//! The part of the table that the hand reaches.
+//! The area of the table that the hand reaches.
 
 use std::f64::consts::PI;
 

@@ -7,7 +7,7 @@ use sdg_robot::height::{GivenHeight, HeightMeasurement};
 use crate::mounted_camera::MountedCamera;
 
 /// The settings for measuring a part's height; `None` unless the camera is on the hand and the model knows lengths.
-/// `told` is the given z in the base frame, in metres.
+/// `told` is the given z of the marks in the base frame, in metres.
 pub fn height_measurement(
     model: &GraspModel,
     camera: &MountedCamera,

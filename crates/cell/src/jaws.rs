@@ -73,9 +73,9 @@ impl Perception {
         touched
     }
 
-    /// For each detection in a picture, in order, the indices of the detections whose parts its jaws touch. If the
-    /// camera's pose is known, fingers have the size of the Franka hand's; otherwise they are as wide as the marked
-    /// line is long.
+    /// For each detection in a picture, in order, the indices of the detections whose parts the jaws touch at its
+    /// grasp. If the camera's pose is known, fingers have the size of the Franka hand's; otherwise they are as wide as
+    /// the marked line is long.
     pub fn touched_by_jaws(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         let regions: Vec<Polygon> = detections.iter().map(|detection| region(detection)).collect();
         let touched = |(idx, detection): (usize, &&GraspDetection)| {

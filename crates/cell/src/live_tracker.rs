@@ -29,7 +29,8 @@ const ENDED: CellError = CellError::SearchThread("ended");
 pub enum SearchTime {
     /// On a separate thread, with their real durations.
     AsItTakes,
-    /// On the caller's thread. The tracker gets the result this number of frames after the searched one, at least one.
+    /// On the caller's thread. The tracker gets the result this number of frames after the searched one, at least one
+    /// frame later.
     Frames(u32),
 }
 

@@ -27,8 +27,8 @@ pub struct Perception {
 enum View {
     /// Pictures of any camera.
     AnyCamera(Box<GraspModel>),
-    /// Pictures of a calibrated camera with a pose. The detector also has the original model, for a camera without a
-    /// pose.
+    /// Pictures of a calibrated camera with a pose. The detector's model is adapted to plan views: it has no region,
+    /// and parts have a known size.
     OverTable(Box<PlanViewDetector>, CameraOverTable),
 }
 

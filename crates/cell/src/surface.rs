@@ -30,7 +30,7 @@ const MIN_CORRELATION: f64 = 0.8;
 /// Minimum decrease of the correlation at distances above [`LEAD_BEYOND_M`] from that height.
 const MIN_LEAD: f64 = 0.15;
 const LEAD_BEYOND_M: f64 = 0.003;
-/// Maximum number of windows that determine the surface, the nearest ones.
+/// Maximum number of windows that determine the surface; the nearest ones are used.
 const MAX_WINDOWS: usize = 60;
 /// Minimum number of windows on a surface.
 const MIN_WINDOWS: usize = 5;
@@ -128,7 +128,7 @@ pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<
     }
     let center = part.outline_m.centroid();
     let min_windows = MIN_WINDOWS.max((MIN_SHARE * windows.len() as f64).ceil() as usize);
-    // The highest surface comes first: the one that carries the part is higher than its surroundings.
+    // The highest surface comes first: the surface that carries the part is higher than its surroundings.
     windows.sort_by(|one, other| other.1.total_cmp(&one.1));
     windows.iter().find_map(|(_, height_m)| one_surface(&windows, *height_m, &center, min_windows))
 }

@@ -39,7 +39,7 @@ pub struct WorkcellMap {
 }
 
 impl WorkcellMap {
-    /// Chooses an area that contains the workspace, the table and the arm's base.
+    /// Chooses an area that contains the workspace, the table, the places and the arm's base.
     pub fn around(workcell: &Workcell) -> Self {
         let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
         let mut map = Self { x_m: [min.x.min(FOOT_M[0][0]), max.x], y_m: [min.y.min(-0.2), max.y.max(0.2)] };

@@ -117,7 +117,7 @@ struct Case {
 
 impl Case {
     fn draw(spec: &ObjectSpec, seed: u64) -> Self {
-        // The parts have different heights as well.
+        // Different parts get different heights.
         let name = spec.name.bytes().fold(seed, |mixed, byte| mixed.wrapping_mul(31).wrapping_add(u64::from(byte)));
         let seed_of_part = name.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let rng = &mut Pcg64Mcg::seed_from_u64(seed_of_part);

@@ -15,7 +15,7 @@ use sdg_robot::RobotError;
 pub enum Outcome {
     /// Exit code 0.
     Done,
-    /// Exit code 3: no grasp was found.
+    /// Exit code 3: nothing was found, such as no grasp or no camera.
     NothingToGrasp,
     /// Exit code 4: the model was written, but fails on its held-out samples.
     ModelFails,

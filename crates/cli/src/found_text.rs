@@ -40,7 +40,7 @@ pub struct Wording<'a> {
 
 impl Wording<'_> {
     /// A detection in words, also in metres if the camera is known. For a refused one, the reasons follow; for an
-    /// accepted one, the parts that its jaws would touch.
+    /// accepted one, the other parts that the jaws would touch.
     pub fn line(&self, found: &Found, touched: &[&GraspDetection]) -> String {
         let Found { detection, pose } = found;
         let grasp = detection.grasp;
@@ -79,8 +79,8 @@ impl Wording<'_> {
         )
     }
 
-    /// For each detection, the indices of the detections whose parts its jaws would touch. Only accepted detections are
-    /// compared.
+    /// For each detection, the indices of the detections whose parts the jaws would touch at its grasp. Only accepted
+    /// detections are compared.
     pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
         self.detector.touched_among_accepted(detections, self.min_score)
     }

@@ -260,7 +260,7 @@ fn remedy(advice: Advice) -> String {
     words.to_owned()
 }
 
-/// `jaws_touch` stays empty, because it depends on the other detections.
+/// `touches` stays empty, because it depends on the other detections.
 fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
     let detection = &found.detection;
     FoundGrasp {

@@ -127,7 +127,7 @@ fn huge_header() -> Vec<u8> {
 
 #[test]
 fn every_format_is_a_demonstration() {
-    // Row 3 of OpenDR's file is the part rotated by 180°; model S learns whatever the photo shows at the marks.
+    // Row 3 of OpenDR's file has the marks of the part rotated by 180°; model S learns the photo at these marks, too.
     let folder = tempfile::tempdir().unwrap();
     let numbered = folder.path().join("3.png");
     fs::copy(shipped("fuel_line", "image.png"), &numbered).unwrap();

@@ -22,7 +22,7 @@ const PARTS: [&str; 12] = [
     "circuit_board",
     "spring_clip",
 ];
-/// Seed of the samples, and number of the one of the tour's six in which many detections are refused.
+/// Seed of the tour's six samples, and the sample in which many detections are refused.
 const SEED: &str = "3";
 const SAMPLE: &str = "000003.png";
 /// Number of small pictures in a row of the sheet, and their size.

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
-/// A wall between the parts and their places.
+/// A wall, a place behind the wall, and a tray.
 const PLACES: &str = r#"
 [[obstacle]]
 name = "wall"

@@ -1,6 +1,7 @@
 //! docs/reference.md lists every command with its arguments and options, as the program defines them.
 //!
-//! `SDG_WRITE_REFERENCE=1` writes the page instead of comparing it. Builds with other features have other commands and are not compared.
+//! `SDG_WRITE_REFERENCE=1` writes the page instead of comparing it. Builds with other features have other commands and
+//! are not compared.
 #![cfg(all(feature = "annotate", feature = "simulation", not(feature = "ros2")))]
 
 use std::fmt::Write;

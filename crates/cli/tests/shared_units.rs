@@ -340,7 +340,7 @@ fn the_submit_script_is_one_that_bash_reads() {
     let path = folder.text("submit.sh", script);
     assert!(Command::new("bash").args(["-n", &path]).status().unwrap().success());
     assert!(!Path::new(&out).exists(), "printing makes nothing");
-    // Without Slurm the error says so.
+    // Without Slurm, the error names the missing program.
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
     command.args(arguments(&out, &["--submit", "slurm", "--yes"])).env("PATH", "/bin/nothing:/usr/bin");
     if !Path::new("/usr/bin/sbatch").exists() {

@@ -8,8 +8,8 @@ use std::process::Command;
 
 use sdg_mujoco_sys::*;
 
-/// `(C expression, value in the bindings)` of a struct's size and of the fields that the simulation
-/// reads, including the last ones of each struct.
+/// `(C expression, value in the bindings)` of each struct's size and of the offsets of some of its
+/// fields, from near its start to near its end.
 macro_rules! layout {
     ($($name:ident { $($field:ident),* $(,)? })*) => {
         vec![$(

@@ -51,7 +51,7 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Encodes frames that are all available. For frames that arrive one by one, see [`AnimationRecorder`].
+    /// Encodes frames that are already in memory. For frames that arrive one by one, see [`AnimationRecorder`].
     ///
     /// # Errors
     /// The errors of [`AnimationRecorder::push`] and [`AnimationRecorder::finish`].

@@ -1,5 +1,5 @@
-//! Grasps over the network while perception is wrong, packets are lost, pictures come late and the table is not where it is told;
-//! MuJoCo says at every step whether a limit of the robot is broken.
+//! Grasps over the network with wrong perception, lost packets, late pictures and a wrong table height. The robot's
+//! limits are checked in every step of MuJoCo.
 //!
 //! `cargo run --release -p sdg-simulation --example endured_attempts [ATTEMPTS] [FIRST_SEED] [MAX_SECS]`
 //!
@@ -7,7 +7,7 @@
 //! sequence ─ FrankaArm ─ relay that loses ─ server in lockstep ─ Probed: limits, at every step ─ PandaPlant (MuJoCo)
 //! ```
 //!
-//! Ends with an error where a limit is broken or an attempt ends without a reason in one line.
+//! Ends with an error if a limit is violated, or if an attempt ends without a reason in one line.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -29,39 +29,42 @@ mod network;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Accelerations and jerks are differences over so many steps: MuJoCo's contacts push from one step to the next.
+/// Number of steps between the values whose differences give accelerations and jerks, because the forces of contacts in
+/// MuJoCo change from step to step.
 const WINDOW: usize = 10;
-/// Below this external torque nothing touches the arm, N·m.
+/// External torque up to which the arm counts as untouched, N·m.
 const UNTOUCHED_NM: f64 = 1.0;
-/// A joint that is controlled by torques is not exactly where it is led: this share of a rate more,
+/// Tolerance of velocities, accelerations, jerks, torques and contact times, as a fraction of the limit: a joint
+/// controlled by torques does not follow its reference exactly.
 const TOLERANCE: f64 = 0.05;
-/// and of half a range some milliradians, or millimetres of the workspace.
+/// Tolerance of joint positions and of the workspace, as a fraction of half of the range: some milliradians or
+/// millimetres.
 const RANGE_TOLERANCE: f64 = 0.01;
-/// External torques at which a Franka stops where the table may push back, N·m, and how long it may take until it yields, s.
+/// External torques at which a Franka stops in motions that may touch the table, N·m.
 const CONTACT_TORQUE_NM: [f64; 7] = [40.0, 40.0, 36.0, 36.0, 32.0, 28.0, 24.0];
 const MAX_CONTACT_SECS: f64 = 0.3;
-/// Where the hand may be: some ways to told places lead out of it.
+/// The allowed workspace of the hand; the paths to some of the given places lead out of it.
 const WORKSPACE: WorkspaceBox =
     WorkspaceBox { min_m: Vector3::new(0.05, -0.55, -0.05), max_m: Vector3::new(0.68, 0.55, 0.95) };
 
-/// The largest share of each limit that was seen, and when.
+/// The largest fraction of each limit that was measured, and its time.
 type Shares = BTreeMap<&'static str, Largest>;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Largest {
     share: f64,
-    /// Since the start of the simulation, s.
+    /// Time since the start of the simulation, s.
     time_secs: f64,
-    /// Since the last external torque above `UNTOUCHED_NM`, s.
+    /// Time since the last external torque above `UNTOUCHED_NM`, s.
     untouched_secs: f64,
 }
 
-/// The simulated robot, with what it did beside its limits.
+/// The simulated robot, with measurements of its motion relative to its limits.
 struct Probed {
     plant: PandaPlant,
     limits: JointLimits,
     panda: ArmGeometry,
-    /// The last joint velocities, and the accelerations over a window.
+    /// The joint velocities of the last [`WINDOW`] steps.
     velocities: Vec<JointVector>,
     accelerations: Vec<JointVector>,
     contact_secs: f64,
@@ -88,14 +91,14 @@ impl Probed {
         let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
         let mut most = |what: &'static str, share: f64| {
             let found = shares.entry(what).or_default();
-            // A NaN would be a broken limit, and is kept.
+            // A NaN counts as a violated limit, and is kept.
             if share > found.share || share.is_nan() {
                 *found = Largest { share, time_secs, untouched_secs };
             }
         };
         let share = |values: &JointVector, limits: &JointVector| values.component_div(limits).amax();
         let limits = &self.limits;
-        // From the middle of a range, as a share of its half.
+        // The distance from the centre of a range, as a fraction of half of the range.
         let [middle, half] = [limits.position_max + limits.position_min, limits.position_max - limits.position_min];
         most("position of joints", share(&(q - middle / 2.0), &(half / 2.0)));
         most("velocity of joints", share(&dq, &limits.velocity_max));
@@ -149,23 +152,24 @@ impl Plant for Probed {
     }
 }
 
-/// What is wrong in an attempt.
+/// The errors of an attempt.
 #[derive(Debug, Clone, Copy)]
 struct Errors {
-    /// Beside the true pose, m, and turned about the vertical, rad.
+    /// Offset of the given pose from the true pose, m, and its rotation about the vertical, rad.
     beside_m: Vector3<f64>,
     turned_rad: f64,
-    /// The part is told so much wider, m.
+    /// Difference of the given width of the part from the true one, m.
     wider_m: f64,
     picture_age_secs: f64,
     table_m: f64,
-    /// The share of states, and of commands, that is lost, and how many are lost in a row.
+    /// Probability for each state, and for each command, that losses begin with it; then [`Self::lost_in_a_row`] are
+    /// lost.
     lost: f64,
     lost_in_a_row: u64,
 }
 
 impl Errors {
-    /// One of six kinds, or all at a time.
+    /// The errors of a seed: one of five kinds, or all of them together.
     fn of(seed: u64) -> (&'static str, Self) {
         let random = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x454e_4455_5245);
         let mut between = |low: f64, high: f64| random.random_range(low..high);
@@ -197,7 +201,7 @@ impl Errors {
         }
     }
 
-    /// Whether the datagram is lost, asked for each in turn.
+    /// Returns a function that is called for each datagram in order, and decides whether the datagram is lost.
     fn loses(self, seed: u64) -> impl FnMut() -> bool + Send + 'static {
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let mut left = 0_u64;
@@ -212,7 +216,7 @@ impl Errors {
     }
 }
 
-/// Perception that knows the truth and tells something else.
+/// Perception that returns the true pose with the errors of an attempt.
 struct Wrong(network::Twin, Errors);
 
 impl PartFinder<FrankaArm> for Wrong {
@@ -233,13 +237,13 @@ impl PartFinder<FrankaArm> for Wrong {
     }
 }
 
-/// How an attempt ended: held, or the step or error and why not.
+/// The outcome of an attempt: `held`, or the failed step or the error, with the reason.
 fn attempt(seed: u64, errors: Errors, shares: &Arc<Mutex<Shares>>) -> Result<String, Failure> {
     let parts: Vec<&str> = ObjectSpec::names().collect();
     let cell = network::cell(parts[seed as usize / 6 % parts.len()], seed);
     let plant = PandaPlant::with_positions(cell.config(), cell.data().qpos())?;
     let positions = plant.positions();
-    // A command that is lost is waited for; one of a busy machine is to be no loss.
+    // The server waits so long for a command that a command delayed by a busy machine does not count as lost.
     let pace = if errors.lost > 0.0 { Pace::Lockstep { max_wait: Duration::from_millis(200) } } else { Pace::LOCKSTEP };
     let config = ServerConfig { robot_port: 0, hand_port: 0, pace, ..ServerConfig::default() };
     let server = Server::start(Probed::new(plant, shares.clone()), &config)?;
@@ -269,7 +273,7 @@ fn main() -> Result<(), Failure> {
     let first_seed: u64 = arguments.next().map_or(Ok(0), |n| n.parse())?;
     let max_secs: u64 = arguments.next().map_or(Ok(u64::MAX), |n| n.parse())?;
     let (begun, mut shares) = (Instant::now(), BTreeMap::new());
-    // Of each kind: attempts, held, failed at a step, stopped.
+    // For each kind of error: number of attempts, held, failed at a step, stopped.
     let mut counts: BTreeMap<&str, [u32; 4]> = BTreeMap::new();
     let mut faults = Vec::new();
     for seed in first_seed..first_seed + num_attempts {
@@ -305,7 +309,8 @@ fn main() -> Result<(), Failure> {
         } else {
             2
         }] += 1;
-        // The robot itself says so of a command that breaks a limit; of a line that is too bad it says so, too.
+        // The robot reports a command that violates a limit. It also reports too many lost packets, which are
+        // expected here.
         let is_broken = ended.replace("communication_constraints_violation", "");
         if ended.trim().is_empty()
             || ended.contains('\n')

@@ -23,7 +23,7 @@ mod placing;
 
 use placing::{Where, beside, cell, config, grasp_on_other_table, place, tray, tray_of};
 
-/// Height of the table above the given height.
+/// How much higher the table is than the robot was told, in metres.
 const HIGHER_M: f64 = 0.005;
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;

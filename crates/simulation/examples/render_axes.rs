@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_axes FOLDER [SEED [PART …]]`
 //!
-//! Writes `PART.png` into FOLDER, with a row per axis, mild to hard from left to right, and prints each picture's
+//! Writes `PART.png` into FOLDER, with a row per axis and its range from left to right, and prints each picture's
 //! parameter, the visible fraction of each instance, and the rendering time.
 
 use std::fs;

@@ -4,7 +4,7 @@
 //! `cargo run --release -p sdg-simulation --example render_look_alikes [FOLDER [PART …]]`
 //!
 //! FOLDER (`look_alikes` by default) gets `PART/KIND/` with files for `ObjectSpec::from_folder`, and `look_alikes.png`
-//! with a row per part: from left to right the part, its mirror image (empty if that equals the part), three
+//! with a row per part: from left to right the part, its mirror image (empty if it hardly differs from the part), three
 //! look-alikes with a moved feature, and the sizes 0.8, 0.9, 1.1 and 1.25.
 
 use std::path::PathBuf;

@@ -22,14 +22,14 @@ const HAND_PERIOD_SECS: f64 = 0.05;
 const HAND_STILL_SECS: f64 = 0.2;
 /// Movement between two checks below which fingers count as not moving, in metres.
 const HAND_STILL_M: f64 = 1e-4;
-/// Maximum duration of a motion of the hand, in seconds: up to 0.04 m of each finger at 0.05 m/s, and time for the
-/// force to increase.
+/// Maximum duration of a motion of the hand, in seconds: time for each finger to move by up to 0.04 m at 0.05 m/s, and
+/// for the force to increase.
 const MAX_HAND_SECS: f64 = 1.6;
 /// Tolerance of the hand's opening, in metres.
 const HAND_THERE_M: f64 = 1e-3;
 /// Fraction of the commanded force above which the hand counts as pressing.
 const PRESSING_SHARE: f64 = 0.8;
-/// Error of the state in a jump fault, in radians.
+/// Error of the reported joint position during a [`ArmFaultKind::Jump`] fault, in radians.
 const JUMP_RAD: f64 = 1.0;
 
 impl From<SimulationError> for RobotError {

@@ -11,14 +11,14 @@ use crate::error::Result;
 use crate::panda::{NUM_ARM_JOINTS, PandaIds};
 use crate::workcell::Workcell;
 
-/// Velocity above which most of the friction acts, rad/s; a lower one would require a shorter step of the simulation.
+/// Velocity above which most of the friction acts, rad/s; a lower value would require a shorter time step.
 const FULL_FRICTION_RAD_S: f64 = 0.02;
 /// Cut-off frequency of the measured force, Hz, because a robot also filters its estimate.
 const CUTOFF_HZ: f64 = 30.0;
 /// Damping that keeps the least squares bounded at singular poses.
 const DAMPING: f64 = 1e-4;
 
-/// Dry friction of a joint's torque at a velocity (rad/s), N·m.
+/// Torque of a joint's dry friction at a velocity (rad/s), N·m.
 pub(crate) fn friction_torque_nm(friction_nm: f64, velocity_rad_s: f64) -> f64 {
     friction_nm * (velocity_rad_s / FULL_FRICTION_RAD_S).tanh()
 }

@@ -137,8 +137,8 @@ impl Data {
         self.check()
     }
 
-    /// Returns an error for invalid numbers and for a full contact list. MuJoCo only warns of them, and resets the
-    /// state after invalid numbers.
+    /// Returns an error for invalid numbers and for a full list of contacts or constraints. In these cases MuJoCo only
+    /// warns, and resets the state after invalid numbers.
     fn check(&self) -> Result<()> {
         let bad = [
             mj::mjWARN_BADQPOS,

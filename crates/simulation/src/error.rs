@@ -55,7 +55,7 @@ pub enum SimulationError {
         existing: Vec<String>,
     },
 
-    /// No OpenGL context could be made without a display.
+    /// Rendering by OpenGL without a display failed.
     #[error("offscreen OpenGL through EGL failed: {reason}. On Debian 12: `apt-get install libegl1 libgl1-mesa-dri`")]
     Rendering {
         /// The step that failed and the message of EGL or MuJoCo.
@@ -70,12 +70,12 @@ pub enum SimulationError {
         reason: String,
     },
 
-    /// A number of a configuration is out of range.
+    /// A value of a configuration is invalid.
     #[error("{field}: expected {expected}, found {found}")]
     Configuration {
         /// Name of the configuration's field.
         field: &'static str,
-        /// The allowed range.
+        /// The allowed values.
         expected: String,
         /// The given value.
         found: String,

@@ -43,7 +43,7 @@ pub struct PandaPlant {
     /// Arm and hand alone, at rest, for computing the torques of gravity.
     standing: (Data, PandaIds),
     positions: SharedPositions,
-    /// Friction of each joint's motor torque during motion, N·m.
+    /// Dry friction of each joint, N·m.
     friction_nm: f64,
 }
 
@@ -51,7 +51,8 @@ impl PandaPlant {
     /// Creates a scene with the arm at rest in its ready pose and the hand open.
     ///
     /// # Errors
-    /// `Model` if MuJoCo rejects the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene.
+    /// `Model` if MuJoCo rejects the scene, `Library` for the wrong libmujoco, `Unstable` for an impossible scene,
+    /// `Configuration` for a camera lens whose model does not cover the corners of its own picture.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;
@@ -66,6 +67,9 @@ impl PandaPlant {
     ///
     /// # Errors
     /// As for [`PandaPlant::new`].
+    ///
+    /// # Panics
+    /// If the number of positions differs from that of the scene.
     pub fn with_positions(config: &WorkcellConfig, qpos: &[f64]) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;

@@ -1,8 +1,8 @@
 //! The hand: its opening is controlled, and its pressing force is limited.
 //!
 //! Each finger follows a reference that moves at a limited speed towards the wanted opening. A stiff spring and a
-//! damper act between them; the sum of their forces is clamped at the allowed force. In free space this is position
-//! control; on a part the spring saturates, which is force control.
+//! damper act between finger and reference; the sum of their forces is clamped at the allowed force. In free space this
+//! is position control; on a part the spring saturates, which is force control.
 
 use crate::data::Data;
 use crate::panda::{FINGER_TRAVEL_M, PandaIds};

@@ -87,7 +87,8 @@ pub use workcell::{Workcell, WorkcellConfig};
 /// libraries at once.
 ///
 /// # Errors
-/// [`SimulationError::Library`] without MuJoCo 2.2.2, [`SimulationError::Rendering`] without EGL or its surfaceless platform.
+/// [`SimulationError::Library`] without MuJoCo 2.2.2, [`SimulationError::Rendering`] without EGL or its surfaceless
+/// platform.
 pub fn load() -> Result<()> {
     guard::initialise()?;
     egl::load()

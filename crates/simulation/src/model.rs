@@ -118,8 +118,8 @@ impl Model {
     /// Compiles an MJCF model. Files that the MJCF names are read only from `assets`, never from disk.
     ///
     /// # Errors
-    /// [`SimulationError::Model`] with MuJoCo's message, [`SimulationError::Asset`] for a repeated
-    /// or empty file, [`SimulationError::Library`] for the wrong libmujoco.
+    /// [`SimulationError::Model`] with MuJoCo's message, [`SimulationError::Asset`] for a file that is repeated, empty
+    /// or too large, or whose name is invalid, [`SimulationError::Library`] for the wrong libmujoco.
     pub fn from_xml(xml: &str, assets: &[Asset]) -> Result<Self> {
         const MODEL_FILE: &str = "model.xml";
         initialise()?;

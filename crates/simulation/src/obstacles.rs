@@ -36,11 +36,11 @@ fn escaped(name: &str) -> String {
     name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
-/// Minimum distance of an obstacle from the base's axis, m, to leave room for the base.
+/// Minimum distance of an obstacle from the z axis of the base, m, to leave room for the base.
 const KEPT_FREE_M: f64 = 0.2;
 
-/// Boxes, cylinders, capsules and spheres of 4 to 40 cm at random places within the arm's reach; deterministic for a
-/// seed.
+/// Boxes, cylinders, capsules and spheres at random poses around the base, with widths of 2 to 40 cm and lengths of up
+/// to 60 cm; deterministic for a seed.
 pub fn random_obstacles(count: usize, seed: u64) -> Vec<Obstacle> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut obstacles = Vec::with_capacity(count);

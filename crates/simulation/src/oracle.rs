@@ -46,7 +46,7 @@ impl Workcell {
     /// Runs one attempt with the part's true pose instead of a detection, as the upper bound for any perception.
     ///
     /// # Errors
-    /// Errors of the simulation.
+    /// As for [`Workcell::run_attempt`].
     pub fn run_oracle_attempt(&mut self, config: &AttemptConfig, seed: u64) -> Result<AttemptReport> {
         self.run_attempt(&mut Oracle, config, seed)
     }

@@ -57,7 +57,7 @@ pub(crate) fn changed_panda_asset(
     Asset { name: PANDA_FILE.to_owned(), bytes: text.into_bytes() }
 }
 
-/// The arm's parts in a compiled model.
+/// The arm's joints, motors, fingers, tcp and camera in a compiled model.
 #[derive(Debug, Clone)]
 pub struct PandaIds {
     /// Joints 1 to 7.

@@ -108,8 +108,8 @@ impl Renderer {
     /// Creates an OpenGL context and uploads the model's textures and meshes.
     ///
     /// # Errors
-    /// [`SimulationError::Rendering`] if EGL or OpenGL is missing or fails,
-    /// [`SimulationError::Configuration`] for a picture without pixels or larger than 8192.
+    /// [`SimulationError::Rendering`] if EGL or OpenGL is missing or fails, [`SimulationError::MuJoCo`] if MuJoCo
+    /// fails, [`SimulationError::Configuration`] for a width or height that is not between 1 and 8192 pixels.
     pub fn new(model: &Arc<Model>, config: RenderConfig) -> Result<Self> {
         for (field, value) in [("render width", config.width), ("render height", config.height)] {
             if !(1..=8192).contains(&value) {

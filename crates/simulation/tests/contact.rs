@@ -12,7 +12,7 @@ use sdg_simulation::{FINGERTIP_BEYOND_TCP_M, PandaPlant, Workcell, WorkcellConfi
 
 /// Friction of each joint's gears.
 const FRICTION_NM: f64 = 1.0;
-/// Height of the table above the table of the limits.
+/// Height of the table above the table height in the limits.
 const HIGHER_M: f64 = 0.005;
 /// Start of the tcp's descent: about 20 mm above the table.
 const ABOVE_M: [f64; 3] = [0.45, 0.0, 0.024];

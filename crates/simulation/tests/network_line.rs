@@ -182,7 +182,7 @@ fn repeated_and_late_states_change_nothing() {
     let repeating: ChangeState = Box::new(move |_, state| {
         let datagram = unchanged(state);
         let earlier = before.replace(datagram.clone());
-        // Each datagram follows a repetition of the one before, and is sent twice.
+        // The previous datagram is repeated before each new one, which is sent twice.
         earlier.into_iter().chain([datagram.clone(), datagram]).collect()
     });
     Line::new(repeating, all_pass()).arrives();

@@ -241,7 +241,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     let camera_pose = prepared.camera.pose;
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = run_sequence(&mut robot, &mut finder, camera_pose, &prepared.config, prepared.place.as_ref());
-    // Neither a missing part nor a part that is held or in its place is an error.
+    // A failed step is an error, unless a picture did not show the part.
     let has_failed = match &ended {
         Ok(ended) => ended.failed.is_some() && !is_nothing_found(&ended.grasp),
         Err(_) => true,

@@ -33,7 +33,7 @@ pub struct ShowArgs {
     pub out: PathBuf,
 }
 
-/// Runs one of them.
+/// Runs one of the commands.
 pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
     let WorkcellCommand::Show(args) = command;
     for (name, found, [min, max]) in

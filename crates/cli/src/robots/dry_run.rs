@@ -42,7 +42,7 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     Ok(())
 }
 
-/// Draws the plan, for which the simulator is needed.
+/// Reports that no plan is drawn in a build without the simulator.
 #[cfg(not(feature = "simulation"))]
 pub(crate) fn draw_dry_run(
     _plan: &DryRun,

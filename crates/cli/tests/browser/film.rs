@@ -11,7 +11,7 @@ use super::photo_to_grasp::patiently;
 
 /// Time for which each picture is shown, in seconds.
 const STANDS: f64 = 1.8;
-/// The held-out sample that is searched: another table, with objects that resemble the part.
+/// Seed of the held-out samples, and the sample that is searched: another table, with objects that resemble the part.
 const SEED: &str = "3";
 const SAMPLE: &str = "000003.png";
 

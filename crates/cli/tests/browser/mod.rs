@@ -1,7 +1,7 @@
 //! The annotation page in headless Chromium, used as a new user would: from a photo to a taught model and back.
 //!
-//! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
-//! target/browser-test.
+//! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are
+//! kept in target/browser-test.
 
 mod calibrating;
 mod corrections;

@@ -143,7 +143,7 @@ fn the_page_says_which_refused_picture_helps_most() {
 #[ignore = "make test-browser: needs Chromium"]
 fn two_hundred_pictures_are_tried_and_saved() {
     const COUNT: usize = 200;
-    /// The grasp of the shipped marks, and the maximum distance of the detected one, in pixels.
+    /// Maximum distance of a detected grasp from the mean of all of them, in pixels.
     const MAX_OFF_PX: f64 = 2.0;
     let page = taught();
     let photo = photo();

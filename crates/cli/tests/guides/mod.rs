@@ -1,5 +1,5 @@
-//! Guides agree with the program: their calls name existing commands and options, their commands run, and the messages that
-//! the page of symptoms quotes stand in the sources.
+//! Guides agree with the program: their calls name existing commands and options, their commands run, and the sources
+//! contain the messages that the page of symptoms quotes.
 
 mod blocks;
 mod run;
@@ -113,7 +113,7 @@ fn calls_in_documents_name_verbs_and_options_that_there_are() {
     let mut known: BTreeSet<String> = OTHERS.iter().map(|name| (*name).to_owned()).collect();
     known.extend(["--help", "--version"].map(str::to_owned));
     long_options(&program, &mut known);
-    // A build without the feature `ros2` does not know that command's options; their fields stand in its source.
+    // A build without the feature `ros2` does not know that command's options; its source has their fields.
     let ros2_fields = fs::read_to_string(root().join("crates/cli/src/commands/ros2/args.rs")).unwrap();
     let is_of_ros2 = |option: &str| ros2_fields.contains(&format!("pub {}:", option[2..].replace('-', "_")));
     let mut faults = Vec::new();

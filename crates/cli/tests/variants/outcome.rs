@@ -83,7 +83,7 @@ pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
     }
 }
 
-/// Whether a call without a grasp reports it in one line with one of these file names and one of these words.
+/// The outcome of a call without a grasp: refused if one line contains one of these file names and one of these words.
 pub fn of_refusal(done: &Output, file_names: &[&String], words: &[&str]) -> Outcome {
     /// The exit code for nothing to grasp, which is a result on standard output.
     const NOTHING_TO_GRASP: i32 = 3;

@@ -10,6 +10,12 @@ use super::{
 };
 use crate::html::format_number;
 
+/// Maximum width of a tag with a word, as a share of the width of its box; chosen by eye.
+const MAX_TAG_SHARE: f64 = 2.0;
+/// Maximum line width of a gripper, as a share of the grasp's width, so that it hides little of a small part's
+/// neighbours; chosen by eye.
+const MAX_GRIPPER_SHARE: f64 = 0.1;
+
 /// The result of comparing a detection with the demonstration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -110,8 +116,14 @@ pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec
     let num_grasps = occupied.len();
     for mark in marks {
         let number = mark.number.map(|number| format!("part {number}: ")).unwrap_or_default();
-        let text = format!("{number}{} {}", format_number(mark.score, 2), mark.verdict.word());
         let height_px = 5.6 * width;
+        let score = format!("{number}{}", format_number(mark.score, 2));
+        let in_words = format!("{score} {}", mark.verdict.word());
+        let is_wide = |bounds: &BoundingBox| {
+            label_bounds(image, Point2::origin(), &in_words, height_px).width() > MAX_TAG_SHARE * bounds.width()
+        };
+        // The colour shows the verdict, too.
+        let text = if mark.bounds.as_ref().is_some_and(is_wide) { score } else { in_words };
         let tag = |at: Point2<f64>| label_bounds(image, at, &text, height_px);
         let covered = |tag: &BoundingBox| occupied.iter().map(|other| other.intersection(tag)).sum::<f64>();
         let size = tag(Point2::origin());
@@ -138,7 +150,8 @@ fn draw_untagged(image: &mut RgbImage, mark: &DetectionMark<'_>) {
     }
     draw_keypoints(image, mark.keypoints, &Pen::new(Color::NEUTRAL).width(0.7 * width));
     if let Some(grasp) = mark.grasped() {
-        draw_grasp_jaws(image, &grasp, &Pen::new(Color::GRASP).width(width));
+        let thin = width.min((MAX_GRIPPER_SHARE * grasp.width).max(1.0));
+        draw_grasp_jaws(image, &grasp, &Pen::new(Color::GRASP).width(thin));
     }
 }
 

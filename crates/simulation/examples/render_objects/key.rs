@@ -128,7 +128,7 @@ fn blade_outline() -> Vec<Point2<f64>> {
     without_straight_points(&outline)
 }
 
-/// y of the bitted edge at a place along the blade.
+/// y of the bitted edge at a position x along the blade.
 fn edge_height(x: f64) -> f64 {
     CUTS.iter().enumerate().fold(BLADE_HALF_WIDTH, |edge, (idx, depth)| {
         let from_flat = ((x - (FIRST_CUT + CUT_SPACING * idx as f64)).abs() - CUT_HALF_FLAT).max(0.0);

@@ -138,7 +138,7 @@ fn leaf_slope() -> f64 {
     (NIP.1 - BACK_HEIGHT) / (NIP.0 - BACK)
 }
 
-/// Height of the upper leaf's centre line at a place along it.
+/// Height of the upper leaf's centre line at a position x along it.
 fn leaf_height(x: f64) -> f64 {
     NIP.1 + leaf_slope() * (x - NIP.0)
 }

@@ -4,7 +4,8 @@ use sdg_robot::{GraspStep, Result, StepObserver};
 
 use crate::workcell::Workcell;
 
-/// Judges each step by the simulated state, and shakes the part if the workcell's errors include a shake.
+/// Judges closing, lifting and holding by the simulated state, and shakes the part if the workcell's errors include a
+/// shake.
 pub(super) struct Judge {
     success_height_m: f64,
     pub(super) shake_amplitude_m: Option<f64>,

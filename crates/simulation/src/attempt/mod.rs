@@ -1,5 +1,5 @@
-//! One grasp attempt: the grasp sequence (`sdg_robot::grasp`) from a random start, judged by the true state at every
-//! step.
+//! One grasp attempt: the grasp sequence (`sdg_robot::grasp`) from a random start, judged by the true state after
+//! closing, lifting and holding.
 
 mod judge;
 mod report;
@@ -29,11 +29,11 @@ pub use report::AttemptReport;
 pub struct AttemptConfig {
     /// Settings of the grasp sequence.
     pub grasp: GraspConfig,
-    /// Height of the part's lowest point above the table that counts as grasped, in metres.
+    /// Minimum height of the part's lowest point above the table for the part to count as lifted, in metres.
     pub success_height_m: f64,
     /// Pictures from outside during the attempt.
     pub record: Option<RecordConfig>,
-    /// Settings for putting the part down.
+    /// Target and settings for putting the part down; `None`: the part is only grasped.
     pub placing: Option<(PlaceGoal, PlacingConfig)>,
 }
 
@@ -113,7 +113,7 @@ impl Workcell {
             && goal.bin_m.is_none()
             && (error.distance_m > placing.tolerance_m || error.angle_rad > placing.tolerance_rad)
         {
-            // The measurement by a picture may be wrong, so that the true position decides.
+            // The measurement by a picture may be wrong; the true position decides.
             let (distance_mm, angle_deg) = (error.distance_m * 1e3, error.angle_rad.to_degrees());
             let why = format!("the part really lies {distance_mm:.1} mm and {angle_deg:.1}° beside its place");
             outcome = GraspOutcome::Failed { step: GraspStep::Check, why };
@@ -150,8 +150,8 @@ impl Workcell {
         self.reset(&start)
     }
 
-    /// A configuration near the ready pose, well above the table, from which the first look-out pose can be reached
-    /// without coming near the table.
+    /// A random configuration near the ready pose, well above the table, from which the arm reaches the first look-out
+    /// pose without coming near the table; the ready pose itself if no such configuration is found.
     fn random_start(&self, config: &GraspConfig, seed: u64) -> Result<JointVector> {
         const SPREAD_RAD: [f64; 7] = [0.9, 0.4, 0.5, 0.4, 0.6, 0.4, 0.9];
         const NUM_TRIES: usize = 200;

@@ -25,7 +25,7 @@ const CELL_M: f64 = 0.001;
 const SAME_HEIGHT_M: f64 = 0.001;
 /// Largest height difference of surfaces that count as the same, in metres.
 const SAME_GROUND_M: f64 = 0.0015;
-/// Largest fraction of a feature's cells below which the surface changes.
+/// Maximum fraction of a feature's cells under which the move may change the surface.
 const MAX_OTHER_GROUND: f64 = 0.04;
 /// Minimum fraction of the cells visible from above that must change.
 const MIN_CHANGE: f64 = 0.012;
@@ -288,7 +288,7 @@ impl Parted {
     }
 }
 
-/// The cells of a map and those between filled ones of the same row.
+/// The filled cells of a map, and all cells between them in the same row.
 fn filled_rows(map: &HeightMap) -> Vec<Point2<f64>> {
     let mut cells = Vec::new();
     for row in 0..map.height {

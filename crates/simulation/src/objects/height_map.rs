@@ -1,4 +1,5 @@
-//! A part seen from above without perspective: the height and the index of the visible surface at each point.
+//! A part seen from above without perspective: the height of the visible surface at each point, and the index of the
+//! mesh to which this surface belongs.
 
 use nalgebra::{Isometry2, Point2, Point3};
 
@@ -11,12 +12,12 @@ pub(crate) struct HeightMap {
     pub(crate) corner: Point2<f64>,
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Row by row (along y): height of the highest surface in metres and the index of its piece.
+    /// Row by row, in ascending order of y: height of the highest surface in metres, and the index of its mesh.
     pub(crate) cells: Vec<Option<(f64, u32)>>,
 }
 
 impl HeightMap {
-    /// Draws triangles with the index of their piece.
+    /// Draws triangles, each with the index of its mesh.
     pub(crate) fn new(triangles: &[([Point3<f64>; 3], u32)], cell_m: f64) -> Self {
         let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
         let mut high = Point2::new(f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -68,14 +69,14 @@ impl HeightMap {
         }
     }
 
-    /// Height (m) and index of the piece at a point.
+    /// Height (m) and index of the mesh at a point.
     pub(crate) fn at(&self, point: &Point2<f64>) -> Option<(f64, u32)> {
         let cell = (point - self.corner) / self.cell_m;
         let inside = cell.x >= 0.0 && cell.y >= 0.0 && cell.x < self.width as f64 && cell.y < self.height as f64;
         if inside { self.cells[cell.y as usize * self.width + cell.x as usize] } else { None }
     }
 
-    /// The centres of the filled cells, with height and piece.
+    /// The centres of the filled cells, with height and index of the mesh.
     pub(crate) fn filled(&self) -> impl Iterator<Item = (Point2<f64>, f64, u32)> + '_ {
         self.cells.iter().enumerate().filter_map(|(idx, cell)| {
             let (z, piece) = (*cell)?;

@@ -71,7 +71,7 @@ const SAME_HEIGHT_M: f64 = 0.001;
 const MIN_MIRROR_DIFFERENCE: f64 = 0.03;
 
 impl ObjectSpec {
-    /// The kinds of look-alikes of this part: all kinds, except the mirror image if it equals the part.
+    /// The kinds of look-alikes of this part: all kinds, except the mirror image if it hardly differs from the part.
     ///
     /// # Errors
     /// As for [`ObjectSpec::look_alike`].

@@ -5,7 +5,7 @@
 //! `datasets/objects` are compiled in; any other folder can be read by [`ObjectSpec::from_folder`].
 //!
 //! In the **object frame**, z points up while the part rests on the table. The **marks** `grasp_start` and `grasp_end`
-//! are on the part's axis, at the place where the gripper holds it: the jaws close across the line between them, and
+//! are on the part's axis, where the gripper holds the part: the jaws close across the line between them, and
 //! the tool centre point moves to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
@@ -132,7 +132,7 @@ impl ObjectSpec {
     /// Reads a user's own part from its folder.
     ///
     /// # Errors
-    /// [`SimulationError::File`] if a file is missing, cannot be read or lacks required content.
+    /// [`SimulationError::File`] if a file is missing, cannot be read or has invalid content.
     pub fn from_folder(folder: &Path) -> Result<Self> {
         Self::read(folder, |file| std::fs::read(folder.join(file)).map(Cow::Owned).map_err(|error| error.to_string()))
     }
@@ -306,7 +306,7 @@ mod tests {
         assert!(start.y < end.y && (start.z - spec.mark_height_m).abs() < 1e-12);
     }
 
-    /// Extent of a part from its grasp in a direction of the object frame.
+    /// Extent of a part from the origin of the object frame in a direction (rad).
     fn reach_m(spec: &ObjectSpec, direction: f64) -> f64 {
         let (sin, cos) = direction.sin_cos();
         spec.footprint.iter().map(|p| p.x * cos + p.y * sin).fold(f64::NEG_INFINITY, f64::max)

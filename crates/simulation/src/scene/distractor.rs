@@ -46,7 +46,7 @@ impl Distractor {
         }
     }
 
-    /// The same distractor at another place on the table.
+    /// The same distractor at another pose on the table.
     pub fn moved_to(&self, table_from_distractor: &Isometry2<f64>) -> Self {
         Self::scaled(self.kind, table_from_distractor, self.seed, self.scale)
     }

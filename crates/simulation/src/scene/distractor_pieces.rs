@@ -94,7 +94,7 @@ pub(super) struct Piece {
     pub finish: Finish,
 }
 
-/// Lays a solid that stands along z along x, with its axis at `height` and two flats horizontal.
+/// Lays a standing solid on its side: its axis becomes parallel to x, at `height`, and two flats become horizontal.
 fn laid(mesh: TriangleMesh, x: f64, height: f64) -> TriangleMesh {
     let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
     mesh.transformed(&(Isometry3::translation(x, 0.0, 0.0) * lying_along_x(height) * quarter))
@@ -291,7 +291,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
     }
 }
 
-/// A round bar along a path; if it is metal, usually with the bands of a round bar.
+/// A round bar along a path, usually with the bands of a round bar instead of its own finish.
 fn bar(path: &[Point3<f64>], radius: f64, finish: Finish, rng: &mut Pcg64Mcg) -> Vec<Piece> {
     let look = if rng.random_bool(0.8) { Look::RoundBar } else { finish.look };
     vec![Piece { mesh: sweep(path, radius, 18), finish: Finish { look, ..finish } }]

@@ -13,8 +13,8 @@ const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 /// Radius around the aim within which shadows are rendered, in metres: slightly larger than the wrist camera's view.
 const SHADOW_RADIUS_M: f64 = 0.5;
 
-/// Fraction of a lamp's cone that its shadow map covers. The map has the same number of texels for any area: a wide
-/// lamp with a narrow map gives even light and still shadows that are sharp to a millimetre.
+/// Fraction of a lamp's cone that its shadow map covers. The map has the same number of texels for any area, so that a
+/// wide cone with a narrow map gives both even light and shadows that are sharp to a millimetre.
 const SHADOW_PART_OF_CONE: f64 = 0.35;
 
 /// The half angle of the cone, in degrees, for which a lamp's shadows reach [`SHADOW_RADIUS_M`].

@@ -34,9 +34,9 @@ pub use table::{Table, TableSurface};
 /// The ranges of a scene's variation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VariationConfig {
-    /// Range of the object's grasp along the base's x, in metres.
+    /// Range of the object's origin along the base's x, in metres.
     pub object_x_m: Range<f64>,
-    /// Range of the object's grasp along the base's y, in metres.
+    /// Range of the object's origin along the base's y, in metres.
     pub object_y_m: Range<f64>,
     /// Number of distractors.
     pub distractors: RangeInclusive<usize>,
@@ -173,7 +173,7 @@ impl PlacedObject {
 /// Outline of two fingers, opened to 0.08 m, with their thickness: x along the marks, y along the jaws' motion.
 const GRIPPER_FOOTPRINT: [[f64; 2]; 4] = [[-0.016, -0.062], [0.016, -0.062], [0.016, 0.062], [-0.016, 0.062]];
 
-/// Number of places that are tried for a distractor before the table counts as full.
+/// Number of poses that are tried for a distractor before it is left out.
 const PLACEMENT_TRIES: usize = 40;
 
 /// Distance by which the range of distractors extends beyond the object's range, in metres.
@@ -195,7 +195,7 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
     sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
 }
 
-/// Distractors at random places, at a distance from each other and from the areas in `taken`.
+/// Distractors at random poses, at a distance from each other and from the areas in `taken`.
 pub(crate) fn sample_distractors(
     mut taken: Vec<Vec<Point2<f64>>>,
     config: &VariationConfig,

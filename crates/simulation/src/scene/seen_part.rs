@@ -15,7 +15,7 @@ const MIN_AREA_M2: f64 = 1e-6;
 pub struct SeenPart {
     /// The outline in the robot's base frame, m, clockwise or counter-clockwise.
     pub outline_in_base: Vec<Point2<f64>>,
-    /// z of the surface under the part, and z of its outline, base frame, m.
+    /// z of the surface under the part, and z of the part's outline, both in the base frame, m.
     pub z_m: [f64; 2],
 }
 

@@ -2,14 +2,15 @@
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// Moves an outline to its place on the table.
+/// Moves an outline to its pose on the table.
 pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> Vec<Point2<f64>> {
     outline.iter().map(|point| table_from_outline * point).collect()
 }
 
 /// The largest gap between two convex outlines along the normals of their edges; negative if they overlap.
 ///
-/// This is the true distance if an edge is nearest, and less than the true distance between two corners.
+/// This is the true distance if the nearest points include an inner point of an edge. If both nearest points are
+/// corners, it is less than the true distance.
 pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
         points

@@ -176,7 +176,7 @@ pub fn lathe(profile: &[(f64, f64)], segments: usize) -> TriangleMesh {
     mesh
 }
 
-/// A ring with chamfered edges on z = 0.
+/// A ring that stands on z = 0, with chamfered edges.
 pub fn ring(inner_radius: f64, outer_radius: f64, height: f64, chamfer: f64, segments: usize) -> TriangleMesh {
     let c = chamfer;
     let profile = [
@@ -192,7 +192,7 @@ pub fn ring(inner_radius: f64, outer_radius: f64, height: f64, chamfer: f64, seg
     lathe(&profile, segments)
 }
 
-/// A cylinder with chamfered edges on z = 0.
+/// A cylinder that stands on z = 0, with chamfered edges.
 pub fn cylinder(radius: f64, height: f64, chamfer: f64, segments: usize) -> TriangleMesh {
     let c = chamfer;
     lathe(
@@ -315,7 +315,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
     mesh
 }
 
-/// The direction perpendicular to `tangent` that is closest to up.
+/// The direction perpendicular to `tangent` that is closest to z, or closest to x if `tangent` is nearly vertical.
 fn perpendicular(tangent: &Vector3<f64>) -> Vector3<f64> {
     let up = if tangent.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
     (up - tangent * tangent.dot(&up)).normalize()

@@ -20,7 +20,7 @@ pub struct TableCameraConfig {
     pub turn_rad_s: f64,
     /// Frames per second (`fps`).
     pub fps: f64,
-    /// Seed of places, directions, light, table and noise (`seed`).
+    /// Seed of positions, directions, light, table and noise (`seed`).
     pub seed: u64,
     /// Length of the sequence in seconds; `None` for no end (`seconds`).
     pub duration_secs: Option<f64>,
@@ -31,7 +31,7 @@ pub struct TableCameraConfig {
     pub beside: Option<String>,
     /// Number of distractors (`things`).
     pub num_things: usize,
-    /// Interval in which the first part is not on the table, in seconds; afterwards it lies at another place (`hide`,
+    /// Interval in which the first part is not on the table, in seconds; afterwards it is at another position (`hide`,
     /// as `2..3`).
     pub hidden_secs: Option<Range<f64>>,
     /// Interval in which a card covers the first part, in seconds (`cover`, as `2..3`).

@@ -90,7 +90,7 @@ impl Mover {
         }
     }
 
-    /// Moves the object to a random place within its bounds.
+    /// Moves the object to a random position within its bounds, at a random angle.
     pub(super) fn put_elsewhere(&mut self) {
         self.place = self.bounds.any_place(&mut self.rng);
         self.yaw_rad = self.rng.random_range(-PI..PI);

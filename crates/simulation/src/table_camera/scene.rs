@@ -17,7 +17,7 @@ use crate::views::base_from_look_camera;
 
 /// The table area that the camera shows from its usual height, in the base frame.
 const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };
-/// Width of the strip along y with the distractors.
+/// Width along y of the strip with the distractors, in metres.
 const STRIP_M: f64 = 0.10;
 /// z of hidden objects, below the floor, in metres.
 const AWAY_M: f64 = -3.0;
@@ -39,7 +39,8 @@ pub(super) fn middle_of(spec: &ObjectSpec) -> (Point2<f64>, f64) {
     (middle, spec.footprint.iter().map(|point| (point - middle).norm()).fold(0.0, f64::max))
 }
 
-/// Strips of the table along y, one for each part; the last strip contains the distractors.
+/// Equal intervals of the table along y, one for each part. With distractors, a strip at the upper end of y is left for
+/// them.
 pub(super) fn lanes(count: usize, with_things: bool) -> Vec<Bounds> {
     let [low, high] = SHOWN.y_m;
     let high = if with_things { high - STRIP_M } else { high };

@@ -1,6 +1,6 @@
 //! Pictures of the wrist camera with ground truth: test images and demonstrations.
 //!
-//! Both are taken by the same code and from the same pose as the pictures of a grasp attempt.
+//! Both are taken by the same code and from the same pose as the first picture of a grasp attempt.
 
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera, outer_outline};

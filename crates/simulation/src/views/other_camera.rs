@@ -83,7 +83,7 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
 /// Largest distance between the part and the point at which the camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
-/// Number of poses tried until the whole part is in the picture.
+/// Maximum number of poses that are tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;
 /// Angle of the first joint at which the arm points away from the table, in radians.
 const TURNED_AWAY_RAD: f64 = 2.7;
@@ -102,7 +102,7 @@ pub enum OnTable {
 pub struct OtherView {
     /// The picture and its camera.
     pub view: CameraView,
-    /// Ground truth of the part; `None` if another object is in its place.
+    /// Ground truth of the part; `None` if another object is shown instead.
     pub truth: Option<GraspTruth>,
     /// Height of the camera above the table, in metres.
     pub height_m: f64,

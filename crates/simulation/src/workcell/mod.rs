@@ -117,7 +117,7 @@ impl Workcell {
         &self.config
     }
 
-    /// Resets everything to the start: part and distractors at their places, the arm at rest at `q`
+    /// Resets everything to the start: part and distractors at their start poses, the arm at rest at `q`
     /// with its hand open.
     ///
     /// # Errors
@@ -137,7 +137,7 @@ impl Workcell {
     /// Moves all objects to their positions in another simulation of the same configuration ([`Data::qpos`]), at rest.
     ///
     /// # Errors
-    /// [`SimulationError::Configuration`] for positions of another scene.
+    /// [`SimulationError::Configuration`] for another number of positions; the errors of [`Data::forward`].
     pub fn set_positions(&mut self, qpos: &[f64]) -> Result<()> {
         if qpos.len() != self.data.qpos().len() {
             return Err(SimulationError::Configuration {

@@ -14,7 +14,7 @@ use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
 
 impl Workcell {
-    /// The wrist camera's present picture.
+    /// The present picture of the wrist camera, or of the camera beside the robot if the configuration has one.
     ///
     /// # Errors
     /// As for [`crate::Data::forward`] and [`Renderer::image`]; [`SimulationError::Configuration`] for a lens whose
@@ -32,7 +32,7 @@ impl Workcell {
         }
     }
 
-    /// The geom that each pixel of the wrist camera's present picture shows.
+    /// The geom that each pixel of the same camera's rendered picture shows, before the lens is applied.
     ///
     /// # Errors
     /// As for [`Renderer::segmentation`].

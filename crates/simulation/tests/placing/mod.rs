@@ -21,7 +21,7 @@ use sdg_simulation::{
 /// Friction torque of each joint's gears.
 pub const FRICTION_NM: f64 = 1.0;
 
-/// The place where the arm runs.
+/// Location of the simulated arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Where {
     /// In this process.

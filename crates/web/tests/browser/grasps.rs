@@ -15,8 +15,8 @@ const MAX_DEGREES: f64 = 0.5;
 /// Maximum difference of scores, which are sums of products that each instruction set rounds in its own order.
 const MAX_SCORE: f64 = 0.01;
 /// Maximum difference of the network's scores. The last bit decides which of two proposals with nearly equal scores is
-/// kept, and so does the network's score (a difference of 0.036 in one of the pictures). The grasp does not depend on
-/// it, because the demonstration decides.
+/// kept, and this changes the network's score (by 0.036 in one of the pictures). The grasp does not depend on this
+/// choice, because the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
 /// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is five
 /// per second (200 ms): measured 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which

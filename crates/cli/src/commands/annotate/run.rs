@@ -54,7 +54,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             .into());
         }
         let start = Start {
-            // Without a home directory, the list of projects lasts as long as the process.
+            // Without a home directory, `note` writes no list, so that this file does not exist and the list is empty.
             recent: recent.unwrap_or_else(|| RecentProjects::at(".sdg-recent-projects.json".into())),
             folder: PathBuf::new(),
             open: opener(preset, camera),
@@ -174,7 +174,7 @@ fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option
     Some(HAND_OPENING_MAX_M / scale)
 }
 
-/// Opens the camera. With a calibration, its picture size is requested, and frames of another size are a fault.
+/// Opens the camera. With a calibration, the size in it is requested, and frames of another size are a fault.
 fn open_camera(
     from: Address,
     mut options: OpenOptions,

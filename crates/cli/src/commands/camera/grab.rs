@@ -54,7 +54,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
     }
     let interrupt = Interrupt::watch();
     let mut camera = open(&args.live.from, &args.live.options())?;
-    // A live camera delivers frames during the wait: a new frame is taken instead of a waiting one.
+    // A live camera delivers frames during the wait: the newest frame is taken, and older ones are dropped.
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
     }

@@ -61,7 +61,7 @@ impl From<MountName> for Mount {
 
 /// Maximum size of a poses file.
 const MAX_BYTES: u64 = 4 << 20;
-/// Ratio of a picture's error to the median from which the picture is reported.
+/// Ratio of a picture's error to the median error above which the picture is reported.
 const MAX_RMS_RATIO: f64 = 3.0;
 
 /// Finds the pose of the camera on the robot's hand or beside the robot.

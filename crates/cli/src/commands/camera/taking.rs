@@ -67,7 +67,7 @@ pub struct Seen {
     pub corners: Vec<SeenCorner>,
 }
 
-/// The texts in the lower left corner of the page.
+/// The texts in the lower left corner of the picture on the page.
 struct Words {
     now: String,
     next: String,
@@ -87,7 +87,7 @@ impl TakingArgs {
         Ok(self.from.as_ref())
     }
 
-    /// Takes pictures until nothing is missing, the camera ends or Ctrl-C is pressed.
+    /// Takes pictures until nothing is missing, [`MAX_TAKEN`] are taken, the camera ends or Ctrl-C is pressed.
     ///
     /// # Errors
     /// The camera or the folder cannot be used.

@@ -116,8 +116,8 @@ struct Sizes {
 }
 
 impl Sizes {
-    /// `None` if the picture can be searched. A picture of a wrong size is skipped; the first one in a row returns the
-    /// error to report.
+    /// `None` if the picture can be searched. A picture of a wrong size is skipped; the first one of its size in a
+    /// row returns the error to report.
     ///
     /// # Errors
     /// The first picture of the stream has a wrong size: the following pictures would have it as well, and all would be

@@ -23,12 +23,13 @@ use crate::error::{Result, SimulationError};
 use crate::model::Asset;
 use crate::panda::FINGERTIP_BEYOND_TCP_M;
 
-/// Smallest height of the tool centre point: the finger tips are then 2 mm above the table. It is also the smallest
-/// height among the shipped parts.
+/// Smallest height of the tool centre point above the table: the finger tips are then 2 mm above the table. No shipped
+/// part has a smaller grasp height.
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
 /// Largest height of a part above the tool centre point; a higher part would touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
-/// Number of boxes along the part's length. Chosen by hand, so that the jaws' pads, 2 cm wide, touch several boxes.
+/// Number of strips of boxes along the part's length. Chosen by hand, so that the jaws' pads, 2 cm wide, touch several
+/// boxes.
 const NUM_STRIPS: usize = 40;
 /// Minimum width of a box, because narrower boxes give no contact. Chosen by hand.
 const MIN_BOX_M: f64 = 1e-4;

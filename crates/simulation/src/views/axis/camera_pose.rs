@@ -26,8 +26,8 @@ const MAX_LOOK_OFFSET_M: f64 = 0.06;
 /// picture.
 const MAX_TRIES: usize = 40;
 
-/// The picture of a camera at another height that points vertically down. It is at the usual place, or moved towards
-/// the part until the whole part is in the picture.
+/// The picture of a camera at another height that points vertically down. The camera is above the usual point, or moved
+/// towards the part until the whole part is in the picture.
 pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
@@ -36,7 +36,7 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     let height_m = LOOK_HEIGHT_M * factor;
     let part = part_in(&cell)?;
     let above = part.base_from_object.translation.vector;
-    // Places from the usual one to vertically above the part.
+    // Poses from above the usual point to above the part.
     let places = (0..=10).map(|step| {
         let share = f64::from(step) / 10.0;
         camera_looking_down(x + share * (above.x - x), y + share * (above.y - y), height_m, 0.0)

@@ -53,7 +53,7 @@ impl Ground {
         inside.then(|| cell.y as usize * WIDTH + cell.x as usize)
     }
 
-    /// The object that a distractor at a place would overlap; if there are several, the part has priority.
+    /// The object that a distractor at a pose would overlap; if there are several, the part has priority.
     fn under(&self, points: &[Point2<f64>], table_from_thing: &Isometry2<f64>) -> Cell {
         let mut found = Cell::Free;
         for point in points {
@@ -133,8 +133,8 @@ pub(super) fn draw_cluttered(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Pushes a distractor from a distance towards a place until it touches an object; returns its position and the touched
-/// object.
+/// Pushes a distractor from a distance towards a point until it touches an object; returns the distractor's pose and
+/// the touched object.
 fn pushed(
     ground: &Ground,
     points: &[Point2<f64>],

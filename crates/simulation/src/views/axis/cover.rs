@@ -53,7 +53,7 @@ struct Slide {
     part: PlacedObject,
     part_map: HeightMap,
     cover_map: HeightMap,
-    /// The position of the cover's centre at the end of its path, in the base frame, and its direction.
+    /// The position of the cover's centre at the end of its path, in the base frame.
     end: Point2<f64>,
     camera: Vector3<f64>,
     cover_middle_m: f64,
@@ -67,7 +67,7 @@ impl Slide {
         let cover = Distractor::scaled(kind, &Isometry2::identity(), rng.random(), scale);
         let triangles: Vec<([Point3<f64>; 3], u32)> = cover.triangles().map(|corners| (corners, 0)).collect();
         let (yaw_rad, from_rad): (f64, f64) = (rng.random_range(-PI..PI), rng.random_range(-PI..PI));
-        // Any place of the part may be covered, at its ends or at its centre.
+        // Any region of the part may be covered, at its ends or at its centre.
         let filled: Vec<Point2<f64>> = part_map.filled().map(|(at, ..)| at).collect();
         let end = part.table_from_object() * filled[rng.random_range(0..filled.len())];
         let heights = triangles.iter().flat_map(|(corners, _)| corners.map(|corner| corner.z));

@@ -15,9 +15,9 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Number of instances of the part.
 const NUM_INSTANCES: usize = 3;
 
-/// Number of places tried for one instance.
+/// Number of poses tried for one instance.
 const TRIES_PER_INSTANCE: usize = 60;
-/// Maximum number of restarts.
+/// Maximum number of attempts to place all instances.
 const MAX_ROUNDS: usize = 60;
 
 /// An ordinary scene with two more instances of the part and up to three distractors.
@@ -44,7 +44,7 @@ pub(super) fn draw_three(request: &mut Request<'_>) -> Result<Drawn> {
     Ok(Drawn { cell, scene, view, parameter })
 }
 
-/// Instances at random places with a distance between them; `None` if one finds no room.
+/// Instances at random poses with a distance between them; `None` if there is no room for one of them.
 fn placed_apart(request: &mut Request<'_>, config: &VariationConfig) -> Option<Vec<PlacedObject>> {
     let rng = &mut request.rng;
     let mut taken: Vec<Vec<Point2<f64>>> = Vec::new();

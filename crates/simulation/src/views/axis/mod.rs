@@ -5,8 +5,8 @@
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter
-//! increases from its mildest value in picture 0 to its hardest in the last one, at random within each stratum, so that
+//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter changes
+//! from one end of its range in picture 0 to the other end in the last picture, at random within each stratum, so that
 //! 20 pictures cover the whole range evenly. The same part, axis, number and seed give the same picture, bit for bit.
 //! All pictures are taken by the wrist camera on the arm, as in an attempt.
 

@@ -19,7 +19,7 @@ pub const PICTURES_PER_AXIS: u64 = 20;
 pub struct AxisParameter {
     /// The number, in `unit`.
     pub value: f64,
-    /// Unit of the number: `of the usual height`, `degrees`, `px`.
+    /// Unit of the number, such as `of the usual height`, `degrees`, `px`.
     pub unit: &'static str,
     /// A description for people.
     pub description: String,
