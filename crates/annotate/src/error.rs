@@ -32,7 +32,7 @@ pub enum Error {
         /// The reason.
         source: sdg_demonstration::Error,
     },
-    /// An annotation could not be written.
+    /// A file could not be written.
     #[error(transparent)]
     Write(#[from] sdg_files::FileError),
     /// Marks needed for the request are missing.
@@ -72,7 +72,7 @@ pub enum Error {
     /// An invalid request.
     #[error("{what}: expected {expected}, found {found}")]
     Request { what: &'static str, expected: String, found: String },
-    /// Another operation must end first.
+    /// The page's state does not allow the request, mostly because another operation must end first.
     #[error("{0}")]
     Busy(&'static str),
     /// Nothing has been taught yet.

@@ -49,7 +49,7 @@ fn is_same_folded(one: &str, other: &str) -> bool {
     one == other || one == resolved_other || resolved_one == other
 }
 
-/// With `%20` and similar escapes resolved; the unchanged name if that gives no text.
+/// With `%20` and similar escapes resolved; the unchanged name if the result is not UTF-8.
 pub(crate) fn without_escapes(name: &str) -> String {
     let bytes = name.as_bytes();
     let hex = |at: usize| char::from(*bytes.get(at)?).to_digit(16);
