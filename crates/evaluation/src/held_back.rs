@@ -61,8 +61,8 @@ pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
 
 /// Removes unmarked parts from the photos, as detected by the model; also returns the number of removed parts.
 ///
-/// The photos are the background of the samples, so unmarked parts in them would count as wrong detections. Marked
-/// parts are already removed.
+/// The photos are the background of the samples, so unmarked parts in them would count as wrong detections. Other
+/// marked parts are already removed.
 fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
     let mut num_others = 0;
     let mut alone = Vec::with_capacity(demonstrations.len());
