@@ -207,7 +207,7 @@ impl HeldBackFigures {
         )
     }
 
-    /// The results as JSON: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    /// The results as JSON: fractions as count and total, their intervals, and the errors, in pixels of the samples.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

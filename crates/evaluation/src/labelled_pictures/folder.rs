@@ -21,8 +21,8 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::error::EvaluationError;
 
-/// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration for both to be
-/// the same instance, in lengths of the line.
+/// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration for both to
+/// be the same instance, in lengths of the line.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
 /// The pictures for testing a model.
