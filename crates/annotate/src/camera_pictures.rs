@@ -114,7 +114,7 @@ fn live_fault(fault: &Fault) -> Option<LiveFault> {
         Fault::Gone { .. } => LiveFaultKind::Gone,
         Fault::Frozen { .. } => LiveFaultKind::Frozen,
         Fault::Black => LiveFaultKind::Black,
-        // The page shows pictures of any size, and it sees by itself when a camera is back.
+        // The page shows pictures of any size, and needs no message when a camera is back.
         _ => return None,
     };
     // The page shows the kind of the fault itself.

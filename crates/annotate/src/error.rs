@@ -47,7 +47,7 @@ pub enum Error {
     /// A file is not a project's file.
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
-    /// A file with the page's token has other content.
+    /// The file of the page's token contains no such token.
     #[error(
         "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",
         path.display()

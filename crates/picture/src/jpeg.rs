@@ -40,7 +40,7 @@ const START_OF_SCAN: u8 = 0xda;
 const HUFFMAN_TABLES: u8 = 0xc4;
 const ADOBE: u8 = 0xee;
 /// The range of the frame markers. It also contains the markers of tables (0xc4) and of arithmetic coding (0xcc), and a
-/// reserved one (0xc8), which are matched before it.
+/// reserved one (0xc8); these are matched before the range.
 const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 

@@ -163,7 +163,7 @@ fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl F
 }
 
 /// Two colours: one near grey, near wood, of any hue, of the part, or of the photo's background, and a darker or
-/// brighter version of it.
+/// brighter version of the first.
 fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     let level = uniform(rng, 0.05, 0.9);
     let base = match index_below(rng, 6) {

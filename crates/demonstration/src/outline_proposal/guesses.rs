@@ -12,7 +12,7 @@ use super::pieces::pieces;
 /// Minimum share of the box that remains without shadows; below it the part itself has a shadow's colour. A thin tube
 /// fills about a twentieth of its box.
 const MIN_UNSHADED_SHARE: f64 = 0.02;
-/// Largest distance of a person's box from the part, as a share of its side, on each side.
+/// Largest distance of a person's box from the part, as a share of the box's side, on each side.
 const MAX_GAP: f64 = 0.1;
 /// Cost of the largest distance beyond [`MAX_GAP`], per share of the box's side.
 const GAP_COST: f64 = 2.0;

@@ -44,7 +44,7 @@ const MIN_LEFT: f64 = 0.12;
 const MIN_IN_ONE_PIECE: f64 = 0.6;
 /// Minimum share of the part's area for another piece of the same shadow.
 const MIN_PIECE_SHARE: f64 = 0.005;
-/// Largest difference of its mean colour from that under the stroke, in units of L*a*b*.
+/// Largest difference of such a piece's mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
 /// Number of rounds of learning colours and cutting after a stroke.
 const ROUNDS: usize = 3;

@@ -29,7 +29,7 @@ pub struct Instance {
 
 impl Instance {
     /// Outline of the complete silhouette, covered or not; may extend outside the picture. `None` for a silhouette
-    /// with fewer than 12 pixel edges, such as two pixels squared.
+    /// with fewer than 12 pixel edges, such as a square of 2 × 2 pixels.
     pub fn outline(&self) -> Option<Polygon> {
         self.silhouette.outline()
     }
