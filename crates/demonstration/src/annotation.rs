@@ -63,8 +63,8 @@ impl Annotation {
     ///
     /// # Errors
     /// [`Error::Contradictory`]: an outline with another bounding box, or a grasp line that does not touch the box.
-    /// Without an outline also a box that is the line's bounding box, and, without a jaw width, a line whose middle is
-    /// outside the box.
+    /// If there is no outline: a box that is the line's bounding box. If there is also no jaw width: a line whose
+    /// middle is outside the box.
     pub fn check(&self) -> Result<()> {
         /// Minimum overlap (IoU) of the box and the outline's bounding box: a box with a margin of 40 % on each side
         /// has 0.31.

@@ -3,7 +3,7 @@
 //!
 //! Only pixels can decide, because half of a coordinate is also a coordinate. An outline fits if colours change across
 //! its border and differ inside from those around it. A box contains background, and the part touches its border only
-//! at some points, so that of a box only the colours inside and around it are compared, not those across its border.
+//! at some points. So for a box only the colours inside and around it are compared, not those across its border.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};

@@ -162,7 +162,7 @@ impl Studio<'_> {
         }
     }
 
-    /// Lays an object over the part that hides at most as much of the part as the style allows, if one is found.
+    /// Lays an object over the part, if one is found that hides at most as much of the part as the style allows.
     fn cover(
         &self,
         canvas: &mut Raster,

@@ -81,7 +81,7 @@ impl Cut {
 }
 
 /// Initial divisions of the frame, with and without additional colours of the surroundings: those of the whole photo
-/// identify a shadow, but colours of another object that resembles the part would make the part surroundings.
+/// identify a shadow, but if another object resembles the part, its colours would assign the part to the surroundings.
 fn guesses<'a>(frame: &'a Frame, surroundings: Option<&ColorMixture>) -> Vec<Guess<'a>> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()
