@@ -207,8 +207,8 @@ impl HeldBackFigures {
         )
     }
 
-    /// The results as JSON: fractions as count and total, their intervals, and the errors, in pixels of the samples and,
-    /// if the model knows lengths, in millimetres.
+    /// The results as JSON: fractions as count and total, their intervals, and the errors, in pixels of the samples
+    /// and, if the model knows lengths, in millimetres.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

@@ -27,7 +27,7 @@
 //! | `GET /api/trial-pictures/{id}/picture` | that picture |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
 //! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
-//! | `POST /api/trial-pictures/{id}/would-help` | best scores of model S elsewhere, if also taught from this one |
+//! | `POST /api/trial-pictures/{id}/would-help` | best scores of S in other pictures with this further photo |
 //! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not there, or revokes that |
 //! | `PUT /api/models/{id}/current` | uses a version of the model from `GET /api/session` |
 //! | `POST /api/models/{id}/compare/{other}` | detections of two versions in the pictures to try |
