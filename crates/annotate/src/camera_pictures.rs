@@ -12,8 +12,8 @@ use sdg_camera::{Address, Camera, CameraError, Fault, Playback};
 
 use crate::live::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 
-/// Default interval between pictures from files without a frame rate in their address. Without it, a folder would be
-/// over, or use a whole core, before anyone has seen it.
+/// Default interval between pictures from files without a frame rate in their address. Without an interval, a folder's
+/// pictures would be over before anyone has seen them, or would use a whole core.
 const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// Time without a complete frame after which torn frames are a fault: single ones are common with cheap cameras.
 const MAX_TORN_AGE: Duration = Duration::from_secs(1);
@@ -114,7 +114,7 @@ fn live_fault(fault: &Fault) -> Option<LiveFault> {
         Fault::Gone { .. } => LiveFaultKind::Gone,
         Fault::Frozen { .. } => LiveFaultKind::Frozen,
         Fault::Black => LiveFaultKind::Black,
-        // The page shows pictures of any size, and it sees by itself when a camera is back.
+        // The page shows pictures of any size, and needs no message when a camera is back.
         _ => return None,
     };
     // The page shows the kind of the fault itself.

@@ -114,7 +114,8 @@ impl Desk {
     /// Creates a project with this name and copies a photo into it.
     ///
     /// # Errors
-    /// The name is empty or taken, the bytes are not a picture, or the folder cannot be created.
+    /// The name is empty or taken, the bytes are not a picture, the folder cannot be created, or another project is
+    /// open.
     pub fn create(&self, name: &str, photo: &str, bytes: &[u8]) -> Result<FirstView> {
         self.take(|start| {
             let name = check_label(name)?;

@@ -32,7 +32,7 @@ pub enum Error {
         /// The reason.
         source: sdg_demonstration::Error,
     },
-    /// An annotation could not be written.
+    /// A file could not be written.
     #[error(transparent)]
     Write(#[from] sdg_files::FileError),
     /// Marks needed for the request are missing.
@@ -47,7 +47,7 @@ pub enum Error {
     /// A file is not a project's file.
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
-    /// A file with the page's token has other content.
+    /// The file of the page's token contains no such token.
     #[error(
         "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",
         path.display()
@@ -72,7 +72,7 @@ pub enum Error {
     /// An invalid request.
     #[error("{what}: expected {expected}, found {found}")]
     Request { what: &'static str, expected: String, found: String },
-    /// Another operation must end first.
+    /// The page's state does not allow the request, mostly because another operation must end first.
     #[error("{0}")]
     Busy(&'static str),
     /// Nothing has been taught yet.

@@ -2,8 +2,8 @@
 //!
 //! Every program on this computer can reach the port, and every web page in the browser can make the browser send
 //! requests to it. So each request must name this server (`Host`: a foreign name that resolves to this address is
-//! rejected), must not come from another page (`Origin`), and must carry the token, which is in the printed address and
-//! later in a cookie.
+//! rejected), must not come from another page (`Origin`), and must carry the token: in the printed address, in a
+//! cookie, or in the header `Authorization`.
 
 use crate::error::{Error, Result};
 use crate::http::{Head, Response};

@@ -75,7 +75,7 @@ pub enum LiveFaultKind {
 }
 
 impl LiveFaultKind {
-    /// Whether the newest picture is valid and current.
+    /// Whether the newest picture can be used in spite of the fault.
     pub fn is_usable(self) -> bool {
         self == Self::Ended
     }

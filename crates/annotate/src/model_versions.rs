@@ -94,7 +94,7 @@ impl ModelVersions {
         Ok(bytes)
     }
 
-    /// Keeps the file at `path` as a version, unless it is one already.
+    /// Copies the file at `path` into the folder of versions, unless it is a known version.
     fn keep_foreign(&self, path: &Path) -> Result<()> {
         let Ok(metadata) = fs::metadata(path) else { return Ok(()) };
         let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
@@ -135,7 +135,7 @@ fn stamp(secs: u64) -> String {
     format!("{year:04}{month:02}{day:02}-{:02}{:02}{:02}", of_day / 3600, of_day / 60 % 60, of_day % 60)
 }
 
-/// A hash of a teaching's inputs, which reveals changes: FNV-1a, 64 bits.
+/// A hash of a text, such as a teaching's inputs: FNV-1a, 64 bits.
 pub fn fingerprint(text: &str) -> String {
     let hash = text
         .bytes()

@@ -10,7 +10,7 @@ pub fn file_name(path: &Path) -> String {
 /// Combining accents, as in umlauts on macOS.
 const COMBINING: std::ops::RangeInclusive<char> = '\u{300}'..='\u{36f}';
 
-/// The characters of a name that every file system accepts.
+/// The first 60 characters of a name, with `_` in place of those that not every file system accepts.
 pub fn safe_stem(name: &str) -> String {
     let safe: String = name
         .chars()
@@ -20,7 +20,7 @@ pub fn safe_stem(name: &str) -> String {
     if safe.chars().all(|c| c == '_') { "part".to_owned() } else { safe }
 }
 
-/// An unused path in the folder of `beside`, from the characters of `name` that every file system accepts.
+/// An unused path in the folder of `beside`, named after the [`safe_stem`] of `name`.
 pub fn free_name(beside: &Path, name: &str, extension: &str) -> PathBuf {
     let stem = safe_stem(&Path::new(name).file_stem().unwrap_or_default().to_string_lossy());
     free_numbered(&beside.with_file_name(format!("{stem}.{extension}")))

@@ -245,7 +245,7 @@ impl ProjectFile {
             // Only the user knows which of them is the photo; until it is chosen, none is added.
             self.removed.extend(self.tried.drain(..).map(|tried| tried.file));
         }
-        // The only picture of a new folder; a picture in a project whose photo is missing is not taken as one.
+        // Without a photo, the first picture that may show the part becomes one: the only picture of a new folder.
         if self.photos.is_empty()
             && let Some(first) = self.tried.iter().position(|tried| !tried.absent)
         {

@@ -44,8 +44,8 @@ pub struct SessionOptions {
     pub model_path: Option<PathBuf>,
     /// A camera for taking pictures; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
-    /// The folder of a project; `images` are then empty. Without it, the first image has its own project. Either is
-    /// opened in its last state.
+    /// The folder of a project; `images` are then empty. Without it, the first image has its own project. The project
+    /// is opened in its last state.
     pub project: Option<PathBuf>,
     /// The page's token, for a server that the same page must find again; `None` for a new one.
     pub token: Option<String>,
@@ -60,7 +60,7 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
 /// The name of a part without surrounding spaces.
 ///
 /// # Errors
-/// The name is empty or too long.
+/// The name is empty, too long, or contains control characters.
 pub(crate) fn check_label(label: &str) -> Result<&str> {
     let label = label.trim();
     let count = label.chars().count();
@@ -76,7 +76,8 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 
 /// A session of the page.
 ///
-/// It calls teaching and previews, which never call it. While the lock on `state` is held, no other lock is taken.
+/// It calls teaching and previews, which never call it. While the lock on `state` is held, only the lock on the
+/// teaching's model is taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
@@ -160,7 +161,7 @@ impl Session {
     /// Renames the object, also in all files already written.
     ///
     /// # Errors
-    /// The name is empty or too long.
+    /// The name is empty, too long or contains control characters, or the project cannot be written.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = check_label(label)?;
         let mut state = self.state();
@@ -219,7 +220,7 @@ impl Session {
     /// Uses a version of the model for the pictures to try, and as the file under the model's own name.
     ///
     /// # Errors
-    /// Unknown version, its file cannot be read, or a teaching is running.
+    /// Unknown version, its file cannot be read, a file cannot be written, or a teaching is running.
     pub fn use_version(&self, id: usize) -> Result<()> {
         self.teaching.check_idle()?;
         let mut state = self.state();
@@ -380,7 +381,7 @@ impl Session {
         self.teaching.stop();
     }
 
-    /// The model taught last.
+    /// The model in use: the one taught last, or a version read from its file.
     ///
     /// # Errors
     /// [`Error::NotTaught`].

@@ -28,11 +28,11 @@ pub struct State {
     pub models: ModelVersions,
     /// Location of the project; `None` until there is a photo.
     pub place: Option<ProjectPlace>,
-    /// Names of pictures of its folder that were removed in earlier sessions.
+    /// Names of pictures of the project's folder that were removed in earlier sessions.
     pub removed_earlier: BTreeSet<String>,
-    /// Missing files named in its file, which may reappear.
+    /// Missing files named in the project's file; they may reappear.
     pub gone: Gone,
-    /// Pictures of its folder that were offered, in the order of their first listing: [`State::others`].
+    /// Pictures of the project's folder that were offered, in the order of their first listing: [`State::others`].
     pub offered: Vec<PathBuf>,
     /// The hand's maximum opening in pixels, if a calibrated camera gives it.
     pub max_opening_px: Option<f64>,

@@ -260,7 +260,7 @@ pub struct FoundGrasp {
     pub grasp: PlanarGrasp,
     /// Length of the marked line, transformed to this image.
     pub line_length: f64,
-    /// Its pose over the table, if the camera is calibrated.
+    /// The grasp's pose over the table, if the camera is calibrated.
     pub pose: Option<GraspPose>,
     /// Why it is refused; `None` if it is accepted.
     pub refusal: Option<Refusal>,

@@ -97,7 +97,7 @@ impl Teaching {
         locked(&self.news).clone()
     }
 
-    /// The model taught last.
+    /// The model in use: the one taught last, or the one of [`set_model`](Self::set_model).
     ///
     /// # Errors
     /// [`Error::NotTaught`].

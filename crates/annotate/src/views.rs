@@ -53,7 +53,7 @@ pub struct ImageView {
 pub struct TrialPictureView {
     /// Its index in the session.
     pub id: usize,
-    /// Its file's name.
+    /// Its name for display.
     pub name: String,
     /// Width, in pixels.
     pub width: u32,

@@ -89,7 +89,7 @@ fn nothing_is_kept_open_after_a_refusal_and_after_http_1_0() {
     }
 }
 
-/// A server whose runtime has opened its files, and which has closed the connection that showed it.
+/// A server whose runtime has opened all files that it needs: one request was answered, its connection is closed.
 #[cfg(unix)]
 fn served_with_all_it_needs() -> Served {
     let served = Served::start();
@@ -105,7 +105,7 @@ fn served_with_all_it_needs() -> Served {
 fn child_with_few_descriptors() {
     let served = served_with_all_it_needs();
     let connect = || std::net::TcpStream::connect(served.host());
-    // Client and server share what there is: the server lacks a descriptor for the connections that it has not taken yet.
+    // Client and server share the descriptors: the server lacks one for the connections that it has not accepted yet.
     let held: Vec<_> = std::iter::from_fn(|| connect().ok()).collect();
     assert!(held.len() > 2, "{}", held.len());
     std::thread::sleep(Duration::from_millis(500));
@@ -113,7 +113,7 @@ fn child_with_few_descriptors() {
     assert_eq!(served.ask("GET", "/api/session", b"").status, 200);
 }
 
-/// As above: nothing will ever be returned, because no connection is open.
+/// As above, but no descriptor will ever be released, because no connection is open.
 #[cfg(unix)]
 #[test]
 #[ignore = "needs few descriptors; another test runs it in a child process"]

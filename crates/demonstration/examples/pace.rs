@@ -1,4 +1,5 @@
-//! Time per sample on one thread: the paper's, whole frames and windows, at the sizes that teaching uses.
+//! Time per sample on one thread: the paper's samples at the photo's size and at a network's input size, and scenes as
+//! whole frames and as windows.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example pace -- IMAGE ANNOTATION [SAMPLES]

@@ -3,8 +3,8 @@
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example sheet -- IMAGE ANNOTATION OUT.png [paper] [seed] [first]
 //! ```
-//! Without arguments it draws its own part and writes `sheet.png`. Box green, outline yellow, keypoints from blue
-//! (start) to red (end), hidden ones hollow.
+//! Without arguments, a built-in part is drawn and `sheet.png` is written. Box green, outline yellow, keypoints from
+//! blue (start) to red (end), hidden ones hollow.
 
 use std::error::Error;
 use std::path::Path;

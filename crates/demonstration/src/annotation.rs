@@ -62,11 +62,12 @@ impl Annotation {
     /// Whether box, grasp and outline can belong to one part.
     ///
     /// # Errors
-    /// [`Error::Contradictory`]: an outline with another bounding box, a grasp line that does not touch the box, and a
-    /// box that contains only the line's two points.
+    /// [`Error::Contradictory`]: an outline with another bounding box, or a grasp line that does not touch the box.
+    /// If there is no outline: a box that is the line's bounding box. If there is also no jaw width: a line whose
+    /// middle is outside the box.
     pub fn check(&self) -> Result<()> {
-        /// Minimum overlap of the box and the outline's bounding box: a box with a margin of 40 % on each side has a
-        /// third.
+        /// Minimum overlap (IoU) of the box and the outline's bounding box: a box with a margin of 40 % on each side
+        /// has 0.31.
         const MIN_IOU: f64 = 0.3;
         /// Files round coordinates.
         const ROUNDING_PX: f64 = 1.5;
@@ -94,7 +95,7 @@ impl Annotation {
             let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
             return contradictory("a grasp line that crosses the box", found);
         }
-        // The opening is measured across the line's midpoint, where there would be nothing to measure.
+        // Without a jaw width, the opening is measured across the line's midpoint, which must therefore lie in the box.
         if self.outline.is_none() && self.jaw_width.is_none() && !self.bbox.contains(&nalgebra::center(&start, &end)) {
             let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
             return contradictory("a grasp line whose middle lies in the box", found);

@@ -1,7 +1,7 @@
 //! COCO JSON, the canonical annotation: `bbox` xywh, `keypoints` x y v named `grasp_start` and `grasp_end`,
-//! `segmentation` polygons; under `attributes`, where CVAT stores values without a COCO field, `jaw_width` in pixels
-//! and `grasp_offset`, the grasp's centre relative to the box's. Coordinates are this project's: the centre of the
-//! first pixel is (0.5, 0.5).
+//! `segmentation` polygons; under `attributes`, where CVAT stores values without a COCO field, `jaw_width` in pixels,
+//! `grasp_offset`, the grasp's centre relative to the box's, and `optional`. Coordinates are this project's: the centre
+//! of the first pixel is (0.5, 0.5).
 
 use nalgebra::Point2;
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ use crate::json::{Node, describe};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
-/// Reads the objects of one image of a COCO file, which must have one.
+/// Reads the objects of one image of a COCO file; the image must have at least one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
@@ -46,7 +46,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
             of_image.push(annotation);
         }
     }
-    // A mask without any other mark gets its own error.
+    // If only crowds and masks are marked, they are kept, and reading them gives a specific error.
     if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
         of_image.retain(|annotation| !is_foreign_annotation(annotation));
     }
@@ -352,7 +352,7 @@ mod tests {
             let mut file = other(keypoints, names);
             let read = read_named(&file, None).unwrap();
             assert_eq!((read[0].label.as_str(), read[0].grasp, &read[1]), ("hole", None, &expected[0]));
-            // On its own it may be the grasp under other names.
+            // Alone, such keypoints may be the grasp under other names.
             file["annotations"].as_array_mut().unwrap().pop();
             let alone = read_named(&file, None);
             assert!(alone.is_err(), "{alone:?}");

@@ -7,8 +7,8 @@ use crate::file_name::{NameLikeness, base_name, common_parts};
 use crate::json::{Node, shorten};
 use crate::{Error, Result};
 
-/// The image of that name, of several the one with the best matching folders; a single image under any name, because
-/// people rename files.
+/// The image with the photo's name; of several, the one whose folders match best. A single image may have any name,
+/// because people rename files.
 pub(crate) fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>> {
     if let [only] = images {
         return Ok(only.clone());

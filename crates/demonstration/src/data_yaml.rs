@@ -14,7 +14,7 @@ pub(crate) struct DataYaml {
     pub names: Vec<String>,
     /// Number of keypoints per object, and numbers per keypoint: 2 or 3.
     pub keypoint_shape: Option<[usize; 2]>,
-    /// The keypoints' names, by class; a list for all classes has none.
+    /// The keypoints' names, by class; a list for all classes has `None` as its class.
     pub keypoint_names: Vec<(Option<usize>, Vec<String>)>,
 }
 
@@ -62,7 +62,7 @@ impl DataYaml {
         Some([place("grasp_start")?, place("grasp_end")?])
     }
 
-    /// As Ultralytics reads it; users fill in the paths.
+    /// The file's text, as Ultralytics reads it; users fill in the paths.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
         if let Some([count, stride]) = self.keypoint_shape {

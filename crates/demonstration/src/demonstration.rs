@@ -67,7 +67,7 @@ impl Demonstration {
     /// Checks a demonstration that was assembled by hand.
     ///
     /// # Errors
-    /// An annotation outside the image, without extent, not finite.
+    /// An annotation outside the image, without extent, not finite, or with an outline that crosses itself.
     pub fn check(&self) -> Result<()> {
         let Annotation { label, bbox, grasp, jaw_width, outline } = &self.annotation;
         let place = |what: &str| format!("{what} of `{label}`");
@@ -84,7 +84,7 @@ impl Demonstration {
         draft.finish(&facts).map(drop)
     }
 
-    /// `count` keypoints evenly spaced on the grasp line, both ends included; [`NUM_KEYPOINTS`] by custom.
+    /// `count` keypoints evenly spaced on the grasp line, both ends included; usually [`NUM_KEYPOINTS`].
     ///
     /// # Errors
     /// [`Error::Lacking`] if no grasp is marked.

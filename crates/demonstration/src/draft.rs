@@ -60,7 +60,7 @@ impl Draft {
         self.finish(image)
     }
 
-    /// Checks that no mark is given as a share of the image, which would be a pixel position in its corner.
+    /// Checks that no mark is given in shares of the image, which would be read as a position in its first pixel.
     pub fn check_is_in_pixels(&self, image: &ImageFacts) -> Result<()> {
         let line: Vec<Point2<f64>> = self.grasp_start.iter().chain(&self.grasp_end).map(|(point, _)| *point).collect();
         let line_place = self.grasp_start.as_ref().map(|(_, place)| place.clone()).unwrap_or_default();

@@ -29,7 +29,7 @@ pub(crate) fn erase_parts(image: &RgbImage, regions: &[Polygon], keep: Option<&P
     })
 }
 
-/// Fills the hole smoothly from its rim and adds the fine grain of another place in the picture.
+/// Fills the hole smoothly from its rim and adds the fine grain of another area of the picture.
 pub(crate) fn fill(picture: &Raster, hole: &[bool]) -> Raster {
     let mut filled = pull_push(picture, hole);
     let (width, height) = (picture.width, picture.height);
@@ -55,7 +55,7 @@ pub(crate) fn fill(picture: &Raster, hole: &[bool]) -> Raster {
     filled
 }
 
-/// The mean of the known pixels around one.
+/// The mean of the known pixels around a pixel.
 fn local_mean(picture: &Raster, hole: &[bool], x: usize, y: usize) -> [f32; 3] {
     const RADIUS: usize = 3;
     let (mut sum, mut count) = ([0.0; 3], 0.0);

@@ -32,7 +32,7 @@ pub enum Error {
     /// A value in the annotation is missing or of the wrong kind.
     #[error("annotation, {place}: expected {expected}, found {found}")]
     Malformed { place: String, expected: String, found: String },
-    /// A coordinate is NaN or infinite.
+    /// A number is NaN or infinite.
     #[error("annotation, {place}: expected a finite number, found {found}")]
     NotFinite {
         /// Path inside the JSON, or line and column.
@@ -84,12 +84,12 @@ pub enum Error {
     /// One object was expected and several are annotated.
     #[error("expected one annotated object, found {found}")]
     SeveralObjects { found: usize },
-    /// The COCO file has no image of that name, or several images and no name was given.
+    /// A file of several images does not have exactly one image of the given name, or no name was given.
     #[error("annotation of several images: expected {expected}, found {found}")]
     ImageNotFound {
-        /// The requested file name.
+        /// The requested image.
         expected: String,
-        /// The names in the file.
+        /// The images in the file.
         found: String,
     },
     /// A format of two files, of which one is missing.

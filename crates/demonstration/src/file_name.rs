@@ -41,7 +41,7 @@ pub(crate) fn common_parts(one: &str, other: &str) -> usize {
     parts(one).zip(parts(other)).take_while(|(one, other)| is_same_folded(one, other)).count()
 }
 
-/// Whether two names are equal across systems; one of them may have escapes of web addresses, or look as if it had.
+/// Whether two names are equal across systems; one may have escapes of web addresses, or text that looks like them.
 fn is_same_folded(one: &str, other: &str) -> bool {
     let folded = |name: &str| composed(name).to_lowercase();
     let [resolved_one, resolved_other] = [one, other].map(|name| folded(&without_escapes(name)));
@@ -49,7 +49,7 @@ fn is_same_folded(one: &str, other: &str) -> bool {
     one == other || one == resolved_other || resolved_one == other
 }
 
-/// With `%20` and similar escapes resolved; the unchanged name if that gives no text.
+/// With `%20` and similar escapes resolved; the unchanged name if the result is not UTF-8.
 pub(crate) fn without_escapes(name: &str) -> String {
     let bytes = name.as_bytes();
     let hex = |at: usize| char::from(*bytes.get(at)?).to_digit(16);

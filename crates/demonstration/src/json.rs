@@ -16,7 +16,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
     // Windows editors often start with a byte order mark, which the parser does not accept.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let parsed = serde_json::from_slice(bytes);
-    // No area is needed here.
+    // Areas are not used, so that invalid ones are replaced.
     let parsed = parsed.or_else(|error| match without_area_literals(bytes) {
         Some(patched) => serde_json::from_slice(&patched),
         None => Err(error),
@@ -41,8 +41,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
     })
 }
 
-/// The same text of the same length with blanks and a 0 for each `area` with Python's NaN or infinity; `None` if there
-/// is none.
+/// The text with each `area` that is Python's NaN or infinity replaced by a 0 and blanks, of unchanged length; `None`
+/// if there is no such area.
 fn without_area_literals(bytes: &[u8]) -> Option<Vec<u8>> {
     const KEY: &[u8] = b"\"area\"";
     let mut patched: Option<Vec<u8>> = None;
@@ -147,7 +147,7 @@ fn key_list(value: &Value) -> String {
     names.join(", ")
 }
 
-/// File contents appear in messages, shortened to a readable length.
+/// Shortens a text of a file to a readable length, for messages.
 pub(crate) fn shorten(text: &str) -> String {
     const LONGEST: usize = 40;
     if text.chars().count() <= LONGEST { text.to_string() } else { text.chars().take(LONGEST).chain(['…']).collect() }

@@ -9,8 +9,9 @@ pub struct LabelledInstance {
     /// The marks, in pixels of the picture. If the picture's border clips the part, the box is clipped and the outline
     /// left out.
     pub annotation: Annotation,
-    /// Neither missed if it is not found nor wrong if it is: mostly covered, or seen from another side. LabelMe: the
-    /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
+    /// Whether the instance does not count: it is no miss if it is not found, and no false detection if it is. For
+    /// parts that are mostly covered or seen from another side. LabelMe: the flag `optional` of any shape of the group;
+    /// COCO: `attributes.optional`.
     pub optional: bool,
     /// Its position in the file, such as `shapes[3]` or `annotations[0]`; empty for one that does not come from a file.
     pub place: String,

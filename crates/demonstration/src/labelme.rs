@@ -12,7 +12,7 @@ use crate::json::{Node, shorten};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
-/// Reads every object of a LabelMe file, which must have one.
+/// Reads every object of a LabelMe file, which must have at least one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
@@ -24,7 +24,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     Ok(instances.into_iter().map(|instance| instance.annotation).collect())
 }
 
-/// Reads every object of a LabelMe file, if there is one, in the order of their first shapes.
+/// Reads the objects of a LabelMe file, if any, in the order of their first shapes.
 pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) -> Result<Vec<LabelledInstance>> {
     if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
         image.check_declared(width.pixels()?, height.pixels()?)?;

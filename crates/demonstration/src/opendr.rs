@@ -51,7 +51,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
     let row = choose_row(rows, image)?;
     let place = |what: &str| format!("{what} row {row}");
     let corner = |x, y| -> Result<Point2<f64>> {
-        // Clipping would turn NaN into a position on the edge.
+        // Clipping would turn an infinite number into a position on the edge.
         let point = Point2::new(boxes.at(&[row, x]), boxes.at(&[row, y]));
         match point.iter().find(|value| !value.is_finite()) {
             Some(found) => Err(Error::NotFinite { place: place("boxes"), found: found.to_string() }),

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::json::shorten;
 
-/// The kind of a file, by its first bytes; `None` if it may be JSON.
+/// The kind of a file, by its content; `None` if it may be JSON or a row of labels, or for unknown bytes.
 pub(crate) fn other_kind(bytes: &[u8]) -> Option<String> {
     let said = |words: &str| Some(words.to_owned());
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();

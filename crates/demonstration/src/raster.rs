@@ -29,7 +29,7 @@ impl Raster {
         }
     }
 
-    /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); beyond the border its pixels are repeated.
+    /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); outside, border pixels are repeated.
     ///
     /// Four floats at once, without a branch: `sdg-shape`'s sampling reads three bytes of an image and ends at the border.
     #[inline(always)]
@@ -55,7 +55,7 @@ impl Raster {
         out
     }
 
-    /// The pixel that (x, y) falls into; beyond the border its pixels are repeated.
+    /// The pixel that contains (x, y); outside, border pixels are repeated.
     #[inline(always)]
     pub fn nearest(&self, x: f32, y: f32) -> [f32; 4] {
         let column = (x.max(0.0) as i32 as usize).min(self.width - 1);
@@ -114,7 +114,7 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Interpolates from `from` to `towards` by `t`, colour only.
+/// Moves the pixel's colour towards `color` by the share `alpha`; the fourth float is kept.
 #[inline(always)]
 pub(crate) fn blend(pixel: &mut [f32; 4], color: [f32; 3], alpha: f32) {
     for k in 0..3 {

@@ -3,7 +3,7 @@
 //!
 //! Only pixels can decide, because half of a coordinate is also a coordinate. An outline fits if colours change across
 //! its border and differ inside from those around it. A box contains background, and the part touches its border only
-//! in places, so that only its inside counts. Readings are compared with each other, never with a fixed threshold.
+//! at some points. So for a box only the colours inside and around it are compared, not those across its border.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -15,10 +15,11 @@ use crate::Annotation;
 /// demonstrations among them, with outlines and with boxes alone, none is refused at 1.1; at 3, of intentionally wrong
 /// marks, 56 of 57 outlines and 126 of 144 boxes are refused.
 const MIN_GAIN: f64 = 3.0;
-/// Limit of the colour difference for marks around a place with one mixture of colours inside and outside, such as a
-/// plain background. The smallest difference of the same photos is 0.99 for an outline and 0.29 for a box.
+/// Minimum colour difference of marks around a part. It is smaller where one mixture of colours is inside and outside,
+/// such as on a plain background. The smallest difference of the same photos is 0.99 for an outline and 0.29 for a box.
 const MIN_DIFFERENCE: f64 = 0.15;
-/// Marks on a pattern of one mixture may well follow its elements: the limit is above a camera's noise, in grey values.
+/// Minimum contrast at the border, in grey values, of marks that may be right although their colour difference is
+/// small: they may follow elements of a pattern. The value is above a camera's noise.
 const MIN_CONTRAST: f64 = 20.0;
 /// Dark photos and those of low contrast have one mixture of colours everywhere: the first and the ninety-ninth
 /// percentile of their grey values differ by less. A photo at 30 % of its brightness has at most 76.
@@ -27,7 +28,7 @@ const MIN_RANGE: f64 = 100.0;
 const MAX_COVER: f64 = 0.5;
 /// Scales the fit of a box to that of an outline, in case a file has both.
 const BOX_CONTRAST: f64 = 100.0;
-/// Samples across the region and its surroundings, and down.
+/// Number of samples across and down, over the region and its surroundings, or over the photo.
 const GRID: u32 = 64;
 /// Width of the surroundings, as a share of the region's mean side.
 const SURROUNDINGS: f64 = 0.25;
@@ -75,8 +76,8 @@ impl MarksReading {
     }
 }
 
-/// The reading in which the marks fit the photo far better than as they are; `None` if they are right, or if there are
-/// none.
+/// The reading in which the marks fit the photo far better than as they are, or [`MarksReading::OtherPhoto`]; `None` if
+/// they may be right, if one covers most of the photo, or if there are none.
 pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksReading> {
     let pixels = f64::from(image.width()) * f64::from(image.height());
     let is_crop = |annotation: &&Annotation| annotation.region().area() > MAX_COVER * pixels;

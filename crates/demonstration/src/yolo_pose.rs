@@ -7,8 +7,9 @@
 //! Labels are in a `data.yaml`; classes are indices into its `names`, and its `kpt_shape` defines the format of a line.
 //!
 //! # Source
-//! The dataset format of Ultralytics' pose models, and what its loader accepts: a byte order mark, blank lines,
-//! coordinates up to a hundredth outside. Comment lines, which begin with `#`, are skipped.
+//! The dataset format of Ultralytics' pose models. As in its loader, a byte order mark and blank lines are accepted.
+//! Coordinates may be up to a pixel outside the image; in its loader, up to a hundredth of the image. Lines that begin
+//! with `#` are comments, and skipped.
 
 use std::fmt::Write;
 
@@ -27,7 +28,7 @@ const MAX_SHARE: f64 = 1.5;
 /// More objects than a person marks on a photo; limits the cost of a hostile file.
 const MAX_OBJECTS: usize = 10_000;
 
-/// Whether the first non-empty line is a row of numbers.
+/// Whether the first line that is neither blank nor a comment is a row of numbers.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(without_mark(bytes)) else { return false };
     let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
@@ -168,7 +169,7 @@ fn keypoint_stride(rest: &[f64], data: &DataYaml) -> Option<usize> {
     if let Some([count, stride]) = data.keypoint_shape {
         return (rest.is_empty() || rest.len() == count * stride).then_some(stride);
     }
-    // Every third number is a visibility: shares of the image lie between these three values.
+    // Every third number is a visibility: shares of the image are hardly ever exactly 0, 1 or 2.
     let visibilities =
         rest.len().is_multiple_of(3) && rest.iter().skip(2).step_by(3).all(|v| [0.0, 1.0, 2.0].contains(v));
     match (visibilities, rest.len().is_multiple_of(2)) {

@@ -8,7 +8,7 @@ const YOLO_POSE: &[u8] = include_bytes!("formats/yolo-pose.txt");
 const COCO: &[u8] = include_bytes!("formats/coco-supervision.json");
 const OPENDR_BOXES: &[u8] = include_bytes!("formats/boxes_train.npy");
 const OPENDR_KEYPOINTS: &[u8] = include_bytes!("formats/kps_train.npy");
-/// The source of all of them.
+/// The annotation from which all these files were made.
 const ORIGINAL: &[u8] = include_bytes!("../../../datasets/demonstrations/fuel_line/annotation.json");
 
 /// Ultralytics writes shares of the image with six digits: 640 · 5e-7 pixels, with the box's width counted in.

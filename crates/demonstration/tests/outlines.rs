@@ -136,8 +136,8 @@ fn hard_shadows_are_left_out() {
 /// Minimum share of a shadow, beside the part, for an outline that includes it.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// It is removed if the outline is as good as that of the same photo without the shadow: at most this much more of the
-/// shadow's area, and at least this share of the overlap with the true outline.
+/// A shadow is removed if the outline is as good as that of the same photo without the shadow: at most this much more
+/// of the shadow's area, and at least this share of the overlap with the true outline.
 const SHADOW_OUT: f64 = 0.15;
 const OVERLAP_KEPT: f64 = 0.9;
 /// Issue 47: eight of ten.

@@ -185,7 +185,8 @@ impl HeldBackFigures {
         )
     }
 
-    /// The results as JSON: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    /// The results as JSON: fractions as count and total, their intervals, and the errors, in pixels of the samples
+    /// and, if the model knows lengths, in millimetres.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

@@ -3,7 +3,7 @@
 /// The stopping criteria of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct CompassSearch {
-    /// First and last step, in units of the caller's neighbours.
+    /// Initial step and smallest step, in the units of `neighbour`'s argument.
     pub steps: (f64, f64),
     /// Minimum gain of a move to a neighbour.
     pub min_gain: f64,

@@ -5,10 +5,10 @@
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GeometryError {
-    /// A coordinate is NaN or infinite.
+    /// A coordinate or a parameter of a camera is NaN or infinite.
     #[error("expected finite coordinates, found {value} in {what}")]
     NotFinite {
-        /// The shape and the coordinate.
+        /// The shape or the parameters that contain the value.
         what: &'static str,
         value: f64,
     },

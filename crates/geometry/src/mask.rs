@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{BoundingBox, GeometryError};
 
-/// One bit per pixel, row by row from the top.
+/// One Boolean per pixel, row by row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mask {
     width: u32,

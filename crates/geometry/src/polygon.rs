@@ -1,4 +1,4 @@
-//! A simple closed polygon: the outline of a part.
+//! A closed polygon: the outline of a part.
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};

@@ -16,7 +16,7 @@ pub(crate) enum Stream {
     Photo = 4,
     /// A sample of a scene.
     Sample = 5,
-    /// The pool of other parts.
+    /// A covering object.
     Others = 6,
     /// Tiles of noise shared by all pictures.
     Tiles = 7,

@@ -3,10 +3,10 @@
 use crate::recipe::{Brushing, Material, Recipe, State};
 use crate::tiles::{Tiles, floor};
 
-/// Number of cells along the longer side of the finest grid.
+/// Maximum number of cells along the longer side of the finest grid, without its margin.
 const MAX_CELLS: f32 = 288.0;
 
-/// Size of the finest cell, in millimetres.
+/// Minimum cell size, in millimetres.
 const MIN_CELL_MM: f32 = 0.12;
 
 /// Number of grids; each has cells twice as wide as the one before.

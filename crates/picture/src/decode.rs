@@ -27,7 +27,7 @@ impl Default for ImageLimits {
 /// Orientation of the decoded pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PixelFrame {
-    /// As shown by a viewer: rotated by the Exif orientation.
+    /// As shown by a viewer: rotated or mirrored by the Exif orientation.
     #[default]
     Upright,
     /// As delivered by the sensor, to which a calibration refers; phones that look straight down set an arbitrary
@@ -73,13 +73,13 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 ///
 /// The format is recognised by the content: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF.
 /// Grey and deeper images are converted; 10 and 12 bits stored in 16 are scaled by their own range. Transparent pixels
-/// are composited over white, unless all are fully transparent, which is how programs leave an unused alpha channel.
-/// Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
+/// are composited over white, unless all pixels are (almost) fully transparent, which is how programs leave an unused
+/// alpha channel. Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
 ///
 /// # Errors
 /// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
-/// file, zero width or height, more than `limits.max_pixels`, a TIFF with several full-size pages, or inks with unknown
-/// storage.
+/// file, zero width or height, more than `limits.max_pixels` (PPM: more than 64 megapixels), a TIFF with several
+/// full-size pages, raw data or a palette that has not 8 bits, or inks with unknown storage.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
@@ -224,7 +224,7 @@ mod tests {
         decode_image(bytes, &ImageLimits::default())
     }
 
-    /// A PNG chunk; its checksum may be wrong, because the size is rejected before the checksum is read.
+    /// A PNG with another size in its header. The checksum is then wrong; the size is rejected before it is read.
     fn png_header(width: u32, height: u32) -> Vec<u8> {
         let mut bytes = encode(&gradient(), ImageFormat::Png);
         bytes[16..20].copy_from_slice(&width.to_be_bytes());
@@ -300,7 +300,7 @@ mod tests {
         assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
         let small = ImageLimits { max_pixels: 40 * 24 - 1 };
         assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
-        // A truncated JPEG; the checks decode its available part.
+        // A JPEG without its end marker: the check of its data would decode the picture, so its size is checked first.
         let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
         jpeg.truncate(jpeg.len() - 2);
         let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();

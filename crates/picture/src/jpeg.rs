@@ -39,8 +39,8 @@ const END: u8 = 0xd9;
 const START_OF_SCAN: u8 = 0xda;
 const HUFFMAN_TABLES: u8 = 0xc4;
 const ADOBE: u8 = 0xee;
-/// Frame markers: baseline and related ones, without the markers of tables (0xc4), the reserved one (0xc8) and
-/// arithmetic coding (0xcc).
+/// The range of the frame markers. It also contains the markers of tables (0xc4) and of arithmetic coding (0xcc), and a
+/// reserved one (0xc8); these are matched before the range.
 const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 
@@ -106,7 +106,7 @@ impl JpegScanner {
                         return JpegEnd::Broken(self.position + 2);
                     }
                     if bytes.len() < self.position + 2 + length {
-                        // The scan is read again when there is more data, which sets the flags above again.
+                        // The segment is read again when there is more data; this sets the same fields again.
                         self.is_in_scan = false;
                         return JpegEnd::NotYet;
                     }
@@ -118,7 +118,7 @@ impl JpegScanner {
 }
 
 impl JpegScanner {
-    /// Records what a scan's header announces.
+    /// Records the coefficients that a scan's header announces.
     fn note_sent(&mut self, header: &[u8]) {
         let Some((&count, rest)) = header.split_first() else { return };
         let Some((components, [first, last, bits, ..])) = rest.split_at_checked(2 * usize::from(count)) else { return };
@@ -150,7 +150,8 @@ impl JpegScanner {
 /// are complete.
 ///
 /// # Errors
-/// Truncated data, or inks without Adobe's marker, for which it is unknown whether they are inverted.
+/// Truncated or invalid data, data without a picture, or inks without Adobe's marker, for which it is unknown whether
+/// they are inverted.
 pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
     let damaged = |reason: String| PictureError::DamagedImage { format: "JPEG", reason };
     let mut scanner = JpegScanner::default();
@@ -187,7 +188,7 @@ pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError>
     Ok(jpeg)
 }
 
-/// Removes the 0xff fill bytes that may precede a marker.
+/// Removes 0xff bytes at the end: fill bytes, which may precede a marker.
 fn without_fill_bytes(jpeg: &[u8]) -> &[u8] {
     let end = jpeg.iter().rposition(|byte| *byte != 0xff).map_or(0, |last| last + 1);
     &jpeg[..end]

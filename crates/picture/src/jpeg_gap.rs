@@ -7,8 +7,8 @@ use image::{DynamicImage, GenericImageView, ImageFormat};
 
 use crate::error::PictureError;
 
-/// Minimum number of zeros in a row. Fewer occur in intact pictures; more occur if much of a picture has one colour,
-/// which the check then distinguishes.
+/// Minimum number of zeros in a row. Shorter runs occur in many intact pictures. Longer runs occur in intact pictures
+/// with large areas of one colour; the check distinguishes these from gaps.
 const MIN_ZEROS: usize = 32;
 /// Number of bytes appended to the data to find out whether the decoder reads them.
 const ADDED_BYTES: usize = 64;
@@ -54,12 +54,12 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// Whether the decoder reads the data to their end, and nothing after it.
+/// Whether the decoder reads the data of a stretch to their end, and needs no data beyond.
 fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
     let decoded =
         |bytes: &[u8]| -> Option<DynamicImage> { image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok() };
     let Some(whole) = decoded(jpeg) else { return true };
-    // Such a picture may consist only of zero codes, and the decoder fills missing blocks with the same colour.
+    // A picture of one colour may consist only of zero codes, and missing blocks are filled with the same colour.
     let first = whole.get_pixel(0, 0);
     if whole.pixels().all(|(.., pixel)| pixel == first) {
         return true;

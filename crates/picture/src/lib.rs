@@ -1,9 +1,10 @@
 //! Decodes pictures from bytes, for files and live pictures.
 //!
 //! ```text
-//! bytes ─ kind by content ─┬─ JPEG: tables added, end searched ─┐
-//!                          ├─ TIFF: the full-size page          ├─ image ─ samples to 8 bits ─ alpha over white ─ upright ─ RGB
-//!                          └─ PNG, WebP, BMP; PPM ──────────────┘                                        [`PixelFrame`]
+//! bytes ─ kind by content ─┬─ JPEG: tables added, end searched ─┐       [`PixelFrame`]
+//!                          ├─ TIFF: the full-size page ─────────┼─ image ─ upright ─ 8 bits ─ alpha over white ─┐
+//!                          ├─ PNG, WebP, BMP ───────────────────┘                                              ├─ RGB
+//!                          └─ PPM ─────────────────────────────────────────────────────────────────────────────┘
 //! ```
 //! The size is checked before memory is allocated. Not included: files, clocks, HEIC and AVIF, raw photos, animations.
 #![forbid(unsafe_code)]

@@ -32,7 +32,7 @@ const LINEAR_RAW: u64 = 34892;
 const FIRST_PRIVATE_TAG: u16 = 32768;
 /// Maximum number of pages.
 const MAX_PAGES: usize = 256;
-/// Maximum number of tags of a page, and of values of these tags.
+/// Maximum number of tags of a page, and of values read of one tag.
 const MAX_ENTRIES: u64 = 4096;
 const MAX_VALUES: u64 = 3 << 16;
 
@@ -63,9 +63,9 @@ pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
 /// Finds the single full-size page and moves it to the front.
 ///
 /// # Errors
-/// There are several full-size pages; the file is a raw photo; a palette does not have 8 bits; or a tag has more values
-/// than the file has bytes, for which the decoder would allocate memory before reading. Structures that cannot be
-/// parsed are left to the decoder.
+/// There are several full-size pages; the file is a raw photo; a palette does not have 8 bits; or the values of a tag
+/// of the first page need more bytes than the file has, for which the decoder would allocate memory before reading.
+/// Structures that cannot be parsed are left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
@@ -158,7 +158,7 @@ impl<'a> File<'a> {
         self.number(at, width)
     }
 
-    /// All pages of the chain, each followed by its subdirectories; `None` if the chain is broken.
+    /// All pages of the chain, each followed by its subdirectories; `None` if the chain is broken or too long.
     fn pages(&self) -> Option<Vec<Page>> {
         let mut pages: Vec<Page> = Vec::new();
         let mut at = self.first_page()?;

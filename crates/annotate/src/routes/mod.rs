@@ -19,6 +19,7 @@
 //! | `GET /api/images/{id}/picture` | a marked picture |
 //! | `PUT /api/images/{id}/marks` | stores and writes marks; returns the result of checking them |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | removes the picture from the session; its file is kept |
+//! | `POST /api/images/{id}/put-back`, `/api/trial-pictures/{id}/put-back` | restores a removed picture |
 //! | `POST /api/images/{id}/outline` | proposes an outline from a box and strokes; null if nothing differs from its surroundings |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | progress of the teaching; starts it; ends it with its current result |
@@ -26,7 +27,7 @@
 //! | `GET /api/trial-pictures/{id}/picture` | that picture |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
 //! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
-//! | `POST /api/trial-pictures/{id}/would-help` | detections of model S in other pictures, if it also learnt from this one |
+//! | `POST /api/trial-pictures/{id}/would-help` | best scores of S in other pictures with this further photo |
 //! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not there, or revokes that |
 //! | `PUT /api/models/{id}/current` | uses a version of the model from `GET /api/session` |
 //! | `POST /api/models/{id}/compare/{other}` | detections of two versions in the pictures to try |

@@ -95,7 +95,7 @@ impl Session {
                 }
             }
         }
-        // Photos of a camera are not named after the first one taken.
+        // The proposed name does not depend on photos taken later with the camera.
         let proposal = || proposed_label(first.as_deref(), home.parent().unwrap_or(Path::new("")));
         let state = State {
             is_named: label.is_some(),
@@ -136,7 +136,7 @@ impl Session {
         }
     }
 
-    /// From now on the first photo of a camera has a project; pictures tried before are moved into it.
+    /// If the session has no project, it gets the project of its first photo; pictures tried before are copied into it.
     pub(super) fn settle_place(&self, state: &mut State, id: usize) -> Result<()> {
         let Some(temporary) = self.temporary.as_ref().filter(|_| state.place.is_none()) else { return Ok(()) };
         state.place = Some(ProjectPlace::of_photo(&state.images[id].picture.path)?);

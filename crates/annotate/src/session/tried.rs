@@ -35,7 +35,8 @@ impl Session {
         Ok(self.state().trial_picture(id)?.clone())
     }
 
-    /// Adds a picture from the page; it is kept in a folder of this session, unless it is one of the project's folder.
+    /// Adds a picture from the page. It is written to the project's folder for tried pictures or, without a project, to
+    /// a temporary folder, unless the project's folder contains it.
     ///
     /// # Errors
     /// The bytes are not a picture, or there are more pictures than a session keeps.
@@ -144,8 +145,9 @@ impl Session {
         compared.collect()
     }
 
-    /// Teaches a model without a network with a tried picture added, and returns its best score in each of other tried
-    /// pictures. Nothing is kept. `None` while a teaching is running, because its model may answer the question.
+    /// Teaches a model without a network with a tried picture added, and returns the model's best score in each of the
+    /// given other tried pictures. Nothing is kept. `None` while a teaching is running, because the model of that
+    /// teaching may answer the question.
     ///
     /// # Errors
     /// A model with a network; an unknown picture; insufficient marks.

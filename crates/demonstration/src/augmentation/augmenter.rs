@@ -55,8 +55,8 @@ impl Augmenter {
         Ok(Self { parts, others: Vec::new(), config, frame, seed, noises, normal })
     }
 
-    /// The same with other parts among the distractors; they have outlines, and their annotations are used for nothing
-    /// else.
+    /// The same with other parts among the distractors: they are cut out of their photos along their outlines. Their
+    /// other marks are not used.
     ///
     /// # Errors
     /// An annotation that does not lie on its image, or has no outline for cutting out the part.
@@ -72,7 +72,7 @@ impl Augmenter {
 
     /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables,
     /// distractors and light in a smaller picture, so that most of a network's computation concerns the part. Sides
-    /// are multiples of `multiple` pixels and at most the frame's; the paper's samples stay whole.
+    /// are multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {
@@ -82,8 +82,7 @@ impl Augmenter {
                 let least = (share * diameter).ceil().min(f64::from(frame)) as u32;
                 (least.div_ceil(multiple) * multiple).min(frame)
             };
-            // Slightly wider than high, like frames; with a margin of one pixel on each side where the part fits
-            // tightly.
+            // Slightly wider than high, like frames.
             let [width, height] = self.frame;
             size = [side(WINDOW_OVER_PART[0], width), side(WINDOW_OVER_PART[1], height)];
         }

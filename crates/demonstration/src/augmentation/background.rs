@@ -26,7 +26,7 @@ impl NoiseBank {
     }
 }
 
-/// Position, turn and scale at which a surface is read.
+/// Rotation and shift with which a surface is read.
 struct Frame {
     turn: [f32; 2],
     shift: [f32; 2],
@@ -162,7 +162,8 @@ fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl F
     }
 }
 
-/// Two colours, mostly near grey or wood, sometimes those of the photo's own background.
+/// Two colours: one near grey, near wood, of any hue, of the part, or of the photo's background, and a darker or
+/// brighter version of the first.
 fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     let level = uniform(rng, 0.05, 0.9);
     let base = match index_below(rng, 6) {
@@ -187,7 +188,7 @@ fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     [base, other]
 }
 
-/// Pieces of the photo's background, each with its own turn and scale.
+/// Pieces of the photo's background, each with its own rotation and scale.
 fn paint_patches(canvas: &mut Raster, part: &Prepared, rng: &mut SampleRng) {
     let cell = canvas.width as f32 * uniform(rng, 0.15, 0.5);
     let columns = (canvas.width as f32 / cell).ceil() as usize + 1;
@@ -211,7 +212,7 @@ fn paint_patches(canvas: &mut Raster, part: &Prepared, rng: &mut SampleRng) {
     }
 }
 
-/// Paints the photo, or the photo without its part, under the map; beyond its borders its background continues.
+/// Paints the photo, or the photo without its part, through the map; beyond its borders, its background is mirrored.
 pub(crate) fn paint_photo(canvas: &mut Raster, part: &Prepared, prepared_from_image: &Homography, with_part: bool) {
     let inner = if with_part { &part.photo } else { &part.background };
     let (right, bottom) = (inner.width as f32, inner.height as f32);

@@ -22,7 +22,7 @@ pub enum AugmentationStyle {
     Scenes(SceneStyle),
 }
 
-/// The paper's augmentation, in this order; as in the published code (OpenDR, `control/single_demo_grasp`).
+/// The paper's augmentation, in the order of the fields, as in the published code.
 ///
 /// # Source
 /// OpenDR, `control/single_demo_grasp`: imgaug's `Affine(rotate)`, `Multiply(per_channel=0.99)`,
@@ -68,7 +68,8 @@ pub struct SceneStyle {
     pub max_perspective: f32,
     /// Minimum share of the part inside the image.
     pub min_inside: f32,
-    /// Maximum number of distractors in a scene; scenes without the part have at least one.
+    /// Maximum number of distractors in a scene (half as many around the part on the photo's own background); scenes
+    /// without the part have at least one.
     pub max_distractors: usize,
     /// Share of the distractors made from pieces of the part itself.
     pub mutant_share: f32,

@@ -18,7 +18,7 @@ pub(crate) struct Lamp {
     pub elevation: f32,
     /// Share of the light that a shadow removes, in `[0, 1]`.
     pub shadow: f32,
-    /// Displacement of a shadow in pixels, for a distractor of medium height.
+    /// Displacement of a shadow, in pixels.
     pub shadow_shift_px: f32,
     /// Half the width of a shadow's edge, in pixels.
     pub shadow_softness_px: f32,
@@ -134,7 +134,7 @@ impl<'a> Distractor<'a> {
             let up = (1.0 - steepness * steepness).sqrt();
             let flat = (1.0 - lamp.elevation * lamp.elevation).sqrt();
             diffuse = (steepness * flat * (gx * lamp.towards[0] + gy * lamp.towards[1]) + up * lamp.elevation).max(0.0);
-            // Mirror direction seen from above.
+            // Vertical component of the mirrored light: the camera is above.
             let mirrored = (2.0 * diffuse * up - lamp.elevation).max(0.0);
             shine = mirrored.powi(8);
         }

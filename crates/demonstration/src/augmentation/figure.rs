@@ -234,7 +234,7 @@ mod tests {
         let capsule = Primitive::Capsule { a: [0.0; 2], b: [2.0, 0.0], radius: 0.5 };
         assert!((capsule.distance(1.0, 1.5) - 1.0).abs() < 1e-6 && (capsule.distance(3.0, 0.0) - 0.5).abs() < 1e-6);
         let square = Primitive::Polygon { center: [0.0; 2], radius: 2.0f32.sqrt(), sides: 4.0, turn: 0.0 };
-        // Corners lie on the axes' diagonals turned by the sector: the inradius is one either way.
+        // A square of side 2: the inradius is one.
         assert!((square.distance(0.0, 0.0) + 1.0).abs() < 1e-5);
         let ring = Primitive::Ring { center: [1.0, 0.0], radius: 2.0, half_width: 0.25 };
         assert!((ring.distance(1.0, 0.0) - 1.75).abs() < 1e-6 && (ring.distance(3.0, 0.0) + 0.25).abs() < 1e-6);

@@ -26,8 +26,8 @@ impl Homography {
         Self(Matrix3::new(c, -s, similarity.tx, s, c, similarity.ty, 0.0, 0.0, 1.0))
     }
 
-    /// Foreshortening by `1 - squeeze` along `direction`, with converging lines of sight: `perspective` is the
-    /// relative change of scale per pixel along it. Keeps the origin.
+    /// Foreshortening by the factor `1 - squeeze` along `direction`, with perspective: `perspective` is the relative
+    /// change of scale per pixel along `direction`. Keeps the origin.
     pub fn tilt(direction: Vector2<f64>, squeeze: f64, perspective: f64) -> Self {
         let d = direction;
         Self(Matrix3::new(
@@ -89,7 +89,7 @@ pub(crate) struct RowMap {
 }
 
 impl RowMap {
-    /// The source position of the centre of the pixel in column `x`.
+    /// The position to which the map moves the centre of the pixel in column `x`.
     #[inline(always)]
     pub fn at(&self, x: usize) -> (f32, f32) {
         let x = x as f32;

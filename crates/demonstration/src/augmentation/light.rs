@@ -44,7 +44,7 @@ fn draw_curves(rng: &mut SampleRng) -> [[f32; CURVE_STEPS]; 3] {
     let gain = uniform(rng, -0.55, 0.35).exp();
     let gamma = uniform(rng, -0.3, 0.3).exp();
     let contrast = uniform(rng, 0.75, 1.25);
-    // Bright lamps and dark corners; sometimes a raised black level.
+    // Change of the black level, mostly raised.
     let lift = uniform(rng, -0.03, 0.08);
     std::array::from_fn(|_| {
         let cast = uniform(rng, -0.12, 0.12).exp();

@@ -33,7 +33,7 @@ impl PaperDraw {
         Self { rotation_deg, channel_gain, shift_px, scale: uniform(rng, style.scale[0], style.scale[1]) }
     }
 
-    /// Photo after rotation, after shift, after scaling, each from the photo, in photo pixels.
+    /// Transforms from the photo to the photo after rotation, after shift and after scaling, in photo pixels.
     fn stages(&self, photo_size: [f64; 2]) -> [PlanarSimilarity; 3] {
         let center = Point2::new(0.5 * photo_size[0], 0.5 * photo_size[1]);
         let angle = Angle::from_degrees(f64::from(self.rotation_deg));
@@ -55,7 +55,7 @@ impl PaperDraw {
         let photo_from_image = fitted(part, width, height).compose(&stages[2]).inverse();
         let prepared_from_photo = PlanarSimilarity { scale: part.prepared_from_photo, ..PlanarSimilarity::IDENTITY };
         let prepared_from_image = RowMap::new(&prepared_from_photo.compose(&photo_from_image));
-        // The position of the pixel in the photo and after each stage; outside the frame it was cropped.
+        // The position of a pixel in the photo and after each stage; a pixel outside one of these frames was cropped.
         let frames = stages.map(|stage| RowMap::new(&stage.compose(&photo_from_image)));
         let frames = [[RowMap::new(&photo_from_image)].as_slice(), &frames].concat();
         let gains = Gains::new(self.channel_gain);

@@ -13,7 +13,8 @@ const OVERHANG_SHARE: f32 = 0.15;
 /// Number of attempts before the part keeps its pose in the photo.
 const TRIES: usize = 40;
 
-/// Draws a pose with at least `style.min_inside` of the part inside an image of `width` × `height`.
+/// Draws a pose with at least `style.min_inside` of the part inside an image of `width` × `height`; if none is found,
+/// the part keeps its pose in the photo.
 pub(crate) fn draw_pose(
     part: &Prepared,
     style: &SceneStyle,
@@ -49,12 +50,13 @@ fn draw_centered(part: &Prepared, style: &SceneStyle, diagonal: f64, rng: &mut S
     let towards = direction(rng).map(f64::from);
     let squeeze = f64::from(uniform(rng, 0.0, style.max_foreshortening));
     let across_part = f64::from(uniform(rng, 0.0, style.max_perspective));
-    // Far from the part, lines of sight must not converge inside the image.
+    // Far from the part, the horizon must not lie inside the image.
     let perspective = (0.5 * across_part / (part.radius * scale)).min(0.4 / diagonal);
     Homography::tilt(Vector2::new(towards[0], towards[1]), squeeze, perspective).compose(&turned)
 }
 
-/// The shifts that keep `[low, high]` inside `[0, length]`, or nearly so; `None` if there are none.
+/// The shifts that keep `[low, high]` inside `[0, length]` with a margin of one pixel, or with up to 40 % outside if
+/// `overhang`; `None` if there are none.
 fn room(low: f64, high: f64, length: f64, overhang: bool) -> Option<[f64; 2]> {
     let allowed = if overhang { 0.4 * (high - low) } else { -1.0 };
     let range = [-low - allowed, length - high + allowed];

@@ -19,9 +19,9 @@ const OVERSAMPLING: f64 = 1.25;
 
 /// Rasters are in *prepared* pixels, points in pixels of the demonstration's photo.
 pub(crate) struct Prepared {
-    /// Prepared pixels from photo pixels.
+    /// Prepared pixels per photo pixel.
     pub prepared_from_photo: f64,
-    /// Output pixels from photo pixels when the photo is scaled to fit the output.
+    /// Output pixels per photo pixel when the photo is scaled to fit the output.
     pub nominal_scale: f64,
     /// Width and height of the photo.
     pub photo_size: [f64; 2],
@@ -118,7 +118,7 @@ impl Prepared {
         }
     }
 
-    /// Prepared pixels from output pixels, for the warp of the rasters.
+    /// The map from output pixels to prepared pixels, for the warp of the rasters.
     pub fn prepared_from_image(&self, image_from_photo: &Homography) -> Homography {
         Homography::scaling(self.prepared_from_photo).compose(&image_from_photo.inverse())
     }

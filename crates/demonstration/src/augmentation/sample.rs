@@ -20,7 +20,8 @@ pub struct Sample {
 /// One part on a [`Sample`], in pixels of the sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleObject {
-    /// The box, clipped at the image's border: tight around the outline or, without one, around the turned box.
+    /// The box, clipped at the image's border: tight around the outline or, without one and in the paper's style,
+    /// around the turned box.
     pub bbox: BoundingBox,
     /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled outside
     /// the image, occluded where something covers them. Empty if no grasp is marked.
@@ -63,7 +64,7 @@ impl SampleObject {
         }
     }
 
-    /// The object as an annotation of the sample, for writing it down.
+    /// The object as an annotation of the sample, for a file.
     ///
     /// The outline is clipped at the border, like the box; a grasp line that leaves the image is left out.
     pub fn annotation(&self, label: &str, sample: &RgbImage) -> Annotation {

@@ -32,12 +32,12 @@ pub(crate) struct Studio<'a> {
     pub normal: &'a NormalTable,
     /// Width and height of the painted picture.
     pub size: [u32; 2],
-    /// Width and height of the frame of which it is a window.
+    /// Width and height of the frame of which the picture is a window.
     pub frame: [u32; 2],
 }
 
 impl Studio<'_> {
-    /// Composes the scene that the generator describes.
+    /// Draws the properties of a scene and paints it.
     pub fn compose(&self, rng: &mut SampleRng) -> Sample {
         let demonstration_idx = index_below(rng, self.parts.len());
         let part = &self.parts[demonstration_idx];
@@ -162,7 +162,7 @@ impl Studio<'_> {
         }
     }
 
-    /// Lays an object over the part that hides at most as much of it as the style allows.
+    /// Lays an object over the part, if one is found that hides at most as much of the part as the style allows.
     fn cover(
         &self,
         canvas: &mut Raster,
@@ -208,7 +208,7 @@ impl Studio<'_> {
     }
 }
 
-/// Ratio of lengths on the photo to lengths on the canvas, around a point.
+/// Canvas pixels per photo pixel, around a point.
 fn scale_at(pose: &Homography, place: &Point2<f64>) -> f64 {
     let here = pose.apply(place);
     let right = pose.apply(&Point2::new(place.x + 1.0, place.y)) - here;

@@ -71,7 +71,7 @@ fn gaussian(canvas: &mut Raster, sigma: f32) {
     }
 }
 
-/// The mean along a line of length (dx, dy).
+/// The mean along the vector (dx, dy), in pixels.
 fn motion(canvas: &mut Raster, dx: f32, dy: f32) {
     let taps = (dx.hypot(dy).ceil() as usize + 1).max(2);
     let (width, height) = (canvas.width as isize, canvas.height as isize);

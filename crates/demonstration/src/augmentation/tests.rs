@@ -42,7 +42,7 @@ fn augmenter(style: SceneStyle) -> Augmenter {
     Augmenter::new(&[demonstration(true)], config.with_output_size(320, 240), 11).unwrap()
 }
 
-/// Only the warp: no distractor, cover, blur or noise.
+/// Mostly the warp: no cover, blur or noise, and at most one distractor.
 fn plain() -> SceneStyle {
     SceneStyle {
         positive_share: 1.0,
@@ -71,7 +71,7 @@ fn a_sample_is_the_same_in_any_order_and_by_any_augmenter() {
     assert!(other_seed.sample(4).image != forward[4].image);
 }
 
-/// Mean position of the pixels around `near` that are as white as the dot's centre, which means equal channels.
+/// Mean position of the white pixels around `near`, weighted by their green.
 fn dot_center(image: &RgbImage, near: Point2<f64>) -> Option<Point2<f64>> {
     const REACH: i64 = 5;
     let mut sum = [0.0; 3];

@@ -1,8 +1,8 @@
 //! Similarity warps of 8-bit pictures in fixed point: fast enough for a picture of full resolution in every sample.
 //!
 //! A pixel is one 64-bit word of four 16-bit lanes (red, green, blue, nothing), so that bilinear interpolation of all
-//! channels is four loads and three multiplications of plain integers. Positions along a row are sums of one step,
-//! and rows are read in runs that lie inside the picture, so that the inner loop has no conditions.
+//! channels is four loads and three multiplications of plain integers. Positions along a row differ by a constant
+//! step, and a run of columns that lies inside the picture is read by a loop without conditions.
 //!
 //! ```text
 //! row ── place, step ── run: columns inside ── blocks of words, 8.8 bits a lane ── gain ── bytes
@@ -59,8 +59,8 @@ impl LanePicture {
         let upper = row * self.stride + column;
         let (upper, lower) = (&self.words[upper..][..2], &self.words[upper + self.stride..][..2]);
         let (a, b, c, d) = (upper[0], upper[1], lower[0], lower[1]);
-        // Differences borrow from lane to lane, and the sum pays it back: it is a·(256 - fx - fy + both) + b·(fx - both)
-        // + c·(fy - both) + d·both, whose weights are never negative and sum to 256.
+        // Differences may borrow from the next lane, but the sum is correct: it is a·(256 - fx - fy + both)
+        // + b·(fx - both) + c·(fy - both) + d·both, whose weights are never negative and sum to 256.
         (a << WEIGHT_BITS)
             .wrapping_add(b.wrapping_sub(a).wrapping_mul(fx))
             .wrapping_add(c.wrapping_sub(a).wrapping_mul(fy))
@@ -78,7 +78,7 @@ impl LanePicture {
     }
 
     /// Reads the columns of one row of the target, multiplied by the gains, into `out`: three bytes per column.
-    /// Beyond the border its pixels are repeated.
+    /// Beyond the picture, the pixels of its border are repeated.
     pub fn read(&self, row: &RowLine, columns: Range<usize>, gains: &Gains, out: &mut [u8]) {
         assert_eq!(out.len(), 3 * columns.len(), "three bytes a column");
         if columns.is_empty() {
@@ -111,7 +111,7 @@ fn lanes(r: u8, g: u8, b: u8) -> u64 {
     u64::from(r) | (u64::from(g) << 16) | (u64::from(b) << 32)
 }
 
-/// A position in the bordered picture, or a step there, with [`FRACTION_BITS`].
+/// A position in the bordered picture, or a step, with [`FRACTION_BITS`].
 #[derive(Debug, Clone, Copy)]
 struct Place {
     u: i64,
@@ -119,7 +119,7 @@ struct Place {
 }
 
 impl Place {
-    /// The position, which then advances by a step.
+    /// Returns the position and advances it by a step.
     #[inline(always)]
     fn pass(&mut self, step: Self) -> Self {
         let here = *self;
@@ -136,7 +136,7 @@ pub(crate) struct RowLine {
 }
 
 impl RowLine {
-    /// The columns in `columns` whose centres come from `[0, size]`.
+    /// The columns in `columns` whose source positions lie in `[0, size]`.
     pub fn inside(&self, size: [f64; 2], columns: Range<usize>) -> Range<usize> {
         let nothing = columns.start..columns.start;
         let (mut low, mut high) = (columns.start as f64, columns.end as f64 - 1.0);
@@ -179,7 +179,7 @@ impl FixedLine {
 /// A similarity between two pictures, `source_from_target`, prepared for reading row by row.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowMap {
-    /// First column of the matrix; the second is that turned by a quarter.
+    /// First column of the matrix; the second is the first, rotated by 90°.
     step: [f64; 2],
     shift: [f64; 2],
 }

@@ -12,21 +12,21 @@ const MIN_VARIANCE: f64 = 1.0;
 const MIN_SAMPLES: usize = 4;
 /// Squared distances, in variances, within which 99 % of a Gaussian's samples lie in three dimensions.
 const EXPLAINED: f32 = 11.3;
-/// Minimum number of samples of a Gaussian for a shadow of its own.
+/// Minimum weight of a Gaussian (its share of the samples) for a shadow of its own.
 const MIN_SHADED_WEIGHT: f32 = 0.05;
 /// Minimum share of the lightness that remains in a shadow.
 const DARKEST_SHADE: f32 = 0.5;
-/// Variance of hue in a shadow, in addition to that in the light: other lamps light it, too.
+/// Variance of a* and b* in a shadow, in addition to that in the light: other lamps light the shadow, too.
 const SHADE_VARIANCE: f32 = 0.3;
-/// The same where a person marked a shadow.
+/// [`DARKEST_SHADE`] where a person marked a shadow.
 const DARKEST_SHADE_SAID: f32 = 0.3;
-/// A colour hardly darker than the surroundings is not a shadow.
+/// Maximum share of the lightness that remains in a marked shadow: hardly darker colours are not in shadow.
 const BRIGHTEST_SAID: f32 = 0.92;
 /// Largest change of a* and b* by other light in a marked shadow.
 const MAX_TINT: f32 = 14.0;
 /// Additional variance in a marked shadow relative to that in the light: its depth and tint vary.
 const SAID_VARIANCE: f32 = 0.8;
-/// L* of a colour of no light, in units in which a shadow scales L*, a* and b* by the same factor.
+/// Added to L*: a shadow scales L* + 16, a* and b* by the same factor.
 const BLACK: f32 = 16.0;
 
 struct Component {
@@ -66,8 +66,8 @@ impl Component {
         self.log_peak - 0.5 * self.distance_squared(color)
     }
 
-    /// Whether the colour is this one with less light: L*, a* and b* are then all smaller by one factor, because all
-    /// are proportional to the cube root of the light.
+    /// Whether the colour is this one with less light: L* + [`BLACK`], a* and b* are then all smaller by one factor,
+    /// because all are proportional to the cube root of the light.
     fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
         let shade = (color.x + BLACK) / (self.mean.x + BLACK);
         let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);
@@ -81,7 +81,7 @@ impl Component {
         off(1) + off(2) < EXPLAINED
     }
 
-    /// Whether the colour lies between this one and this one in the shadow.
+    /// Whether the colour lies between this Gaussian's colour in the light and the same colour in the shadow.
     fn explains_under(&self, color: &Vector3<f32>, shade: &Shade) -> bool {
         if self.weight < MIN_SHADED_WEIGHT {
             return false;
@@ -99,7 +99,7 @@ impl Component {
     }
 }
 
-/// The effect of a shadow on a colour: L* above [`BLACK`], a* and b* are scaled, and a* and b* are shifted by the other
+/// The effect of a shadow on a colour: L* + [`BLACK`], a* and b* are scaled, and a* and b* are shifted by the other
 /// light in the shadow.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shade {
@@ -121,8 +121,8 @@ pub(crate) struct ColorMixture {
 }
 
 impl ColorMixture {
-    /// Learns without a previous state: colours are split in two across their largest extent until there are as
-    /// many groups as Gaussians. `None` for too few colours.
+    /// Learns without previous Gaussians: groups of colours are split in two across their largest extent until there
+    /// are as many groups as Gaussians. `None` for too few colours.
     ///
     /// # Source
     /// Orchard and Bouman, "Color quantization of images", 1991, which GrabCut starts from as well. It needs no random
@@ -170,7 +170,7 @@ impl ColorMixture {
         (!components.is_empty()).then_some(Self { components })
     }
 
-    /// Logarithm of the density, except a constant that is equal in all mixtures.
+    /// Logarithm of the density, without a constant that is equal in all mixtures.
     pub fn log_density(&self, color: &Lab) -> f32 {
         let color = vector(color);
         let densities = || self.components.iter().map(|component| component.log_density(&color));
@@ -185,7 +185,7 @@ impl ColorMixture {
         self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
     }
 
-    /// The shadow in which a learnt colour looks like this one: with the Gaussian that needs the smallest tint for it.
+    /// The shadow in which a learnt colour looks like this one: of all Gaussians, that with the smallest tint.
     pub fn shade_of(&self, color: &Lab) -> Option<Shade> {
         let color = vector(color);
         let shades =

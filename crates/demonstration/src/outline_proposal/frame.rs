@@ -178,7 +178,7 @@ impl Frame {
         colors
     }
 
-    /// Colours around the box, and of the whole photo.
+    /// Colours around the box, and of the whole photo outside the box.
     pub fn surroundings(&self) -> Option<ColorMixture> {
         let (_, mut around) = self.colors_of(&self.candidates);
         around.extend_from_slice(&self.elsewhere);

@@ -1,7 +1,8 @@
 //! Several guesses of the part, each cut, and the choice of the cut that a person meant with the box.
 //!
-//! The constants of the choice were fitted on 30 pictures of generated parts (seeds from 2^51, boxes as drawn and looser by a twelfth), on the
-//! shipped demonstrations, and on the five photographs that docs/comparison-with-tools.md reports; not on the tests' pictures.
+//! The constants of the choice were fitted on 30 pictures of generated parts (seeds from 2^51, boxes as drawn and
+//! looser by a twelfth), on the shipped demonstrations, and on the five photographs that docs/comparison-with-tools.md
+//! reports; not on the tests' pictures.
 
 use super::color_mixture::ColorMixture;
 use super::frame::Frame;
@@ -11,22 +12,22 @@ use super::pieces::pieces;
 /// Minimum share of the box that remains without shadows; below it the part itself has a shadow's colour. A thin tube
 /// fills about a twentieth of its box.
 const MIN_UNSHADED_SHARE: f64 = 0.02;
-/// Largest distance of a person's box from the part, as a share of its side, on each side.
+/// Largest distance of a person's box from the part, as a share of the box's side, on each side.
 const MAX_GAP: f64 = 0.1;
-/// Cost of a side on which the part ends farther from the box than that, per share of the box's side.
+/// Cost of the largest distance beyond [`MAX_GAP`], per share of the box's side.
 const GAP_COST: f64 = 2.0;
 /// Bonus of the guess without shadows: a shadow's border is an edge, too, and reaches the box.
 const UNSHADED_BONUS: f64 = 0.15;
-/// Another cut gets that bonus, too, if it leaves out a shadow that the cut of that guess includes, of at least this share:
-/// colours learnt from a cut often include a hard shadow. Fitted on wing bolt, drill screw and the tuned rendered sets of
-/// datasets/split.toml and on generated parts (seeds from 2^51), 367 proposals: with 0.08, 0.1, 0.12 and 0.15 the overlap
-/// of 10, 8, 8 and 5 proposals is better by 0.02 or more, that of none worse; of the wing bolt's photos it is 0.69, 0.69,
-/// 0.69 and 0.65, and 0.58 without.
+/// Another cut gets [`UNSHADED_BONUS`], too, if it leaves out a shadow, of at least this share, that the cut of the
+/// guess without shadows includes: colours learnt from a cut often include a hard shadow. Fitted on wing bolt, drill
+/// screw and the tuned rendered sets of datasets/split.toml and on generated parts (seeds from 2^51), 367 proposals:
+/// with 0.08, 0.1, 0.12 and 0.15 the overlap of 10, 8, 8 and 5 proposals is better by 0.02 or more, that of none worse;
+/// the overlap on the wing bolt's photos is 0.69, 0.69, 0.69 and 0.65, and 0.58 without this rule.
 const MIN_SHADOW: f64 = 0.1;
-/// Bonus of the cut that uses the colours of the whole photo, if both follow edges. With 0, 0.05 and 0.1 the shipped
-/// pneumatic cylinder's overlap was 0.846, 0.871, 0.871.
+/// Bonus of a cut that uses the colours of the whole photo: it decides between cuts that follow edges about equally
+/// well. With 0, 0.05 and 0.1 the shipped pneumatic cylinder's overlap was 0.846, 0.871, 0.871.
 const ELSEWHERE_BONUS: f64 = 0.05;
-/// Minimum share of a cut along edges of the picture for a part: noise can be cut, too.
+/// Minimum score of a cut, bonuses included, for a part: noise can be cut, too.
 const MIN_SCORE: f64 = 0.2;
 
 /// The most likely part, cut; `None` if nothing stands out.
@@ -72,15 +73,15 @@ struct Cut {
 }
 
 impl Cut {
-    /// Whether a shadow in the other cut is left out in this one. A dark part has a shadow's colours in all cuts: only the
-    /// share counts that is not in this one.
+    /// Whether a shadow in the other cut is left out in this one. A dark part has a shadow's colours in all cuts: only
+    /// the share that this cut leaves out counts.
     fn leaves_shadow_of(&self, other: &Self) -> bool {
         other.shadow.min(other.table + other.shadow - self.table - self.shadow) > MIN_SHADOW
     }
 }
 
 /// Initial divisions of the frame, with and without additional colours of the surroundings: those of the whole photo
-/// identify a shadow, but colours of another object that resembles the part would make the part surroundings.
+/// identify a shadow, but if another object resembles the part, its colours would assign the part to the surroundings.
 fn guesses<'a>(frame: &'a Frame, surroundings: Option<&ColorMixture>) -> Vec<Guess<'a>> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()
@@ -140,7 +141,7 @@ fn lightness_threshold(frame: &Frame) -> f32 {
 }
 
 /// The score of the largest piece of a cut: the share of its border that runs along edges of the picture, in [0, 1],
-/// minus the unused part of the box. Returned with that piece.
+/// minus the cost of its largest distance from a side of the box. Returned with that piece.
 fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
     let width = frame.width;
     let piece = pieces(cut, width).into_iter().max_by_key(Vec::len)?;

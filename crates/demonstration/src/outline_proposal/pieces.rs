@@ -1,6 +1,6 @@
 //! Connected pieces of a picture.
 
-/// The connected pieces of the marked pixels, by neighbours across and down.
+/// The connected pieces of the marked pixels, by horizontal and vertical neighbours.
 pub(crate) fn pieces(marked: &[bool], width: usize) -> Vec<Vec<usize>> {
     let mut seen = vec![false; marked.len()];
     let mut pieces = Vec::new();

@@ -4,7 +4,7 @@
 //! stroke by small steps of colour, without leaving the wrong side. A stroke over a shadow selects the whole shadow:
 //! colours of the surroundings in the shadow under the stroke, and in weaker ones. The part is then cut again, and the
 //! changes near the stroke are applied. People draw into the middle of the wrong area, so that the distance from the
-//! stroke to the part's border indicates its size.
+//! stroke to the part's border indicates the size of that area.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,9 +18,10 @@ use super::stroke::Stroke;
 /// Largest sum of colour differences on the path to a pixel of the region, in units of L*a*b*. Chosen by hand: a
 /// shadow's edge is about 20 units wide; the steps of an even surface sum to less than 10.
 const MAX_WAY: f32 = 14.0;
-/// Largest difference of a region's pixel from the stroke's colour.
+/// Largest difference of a region's pixel from the stroke's pixel from which it is reached, in the same units.
 const MAX_DIFFERENCE: f32 = 24.0;
-/// Length of a step in the same units: close pixels come first, and noise does not lead across the whole picture.
+/// Added to the colour difference of each step: close pixels come first, and noise does not lead across the whole
+/// picture.
 const STEP: f32 = 0.05;
 /// Size of the stroke's own surroundings, which belong to its region, as a share of the frame's diagonal.
 const RADIUS_SHARE: f64 = 0.012;
@@ -32,7 +33,7 @@ const REACH: f32 = 5.0;
 const TABLE_REACH: f32 = 1.0;
 /// Minimum value of that distance, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// Minimum edge strengths at which a selected shadow ends; the one that leaves a part along edges is used.
+/// Minimum edge strengths at which a selected shadow ends; the one whose remaining part runs most along edges is used.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
 /// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
 /// shadow.
@@ -43,15 +44,15 @@ const MIN_LEFT: f64 = 0.12;
 const MIN_IN_ONE_PIECE: f64 = 0.6;
 /// Minimum share of the part's area for another piece of the same shadow.
 const MIN_PIECE_SHARE: f64 = 0.005;
-/// Largest difference of its mean colour from that under the stroke, in units of L*a*b*.
+/// Largest difference of such a piece's mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
-/// Number of times that colours are learnt again after a stroke.
+/// Number of rounds of learning colours and cutting after a stroke.
 const ROUNDS: usize = 3;
 
 /// The corrected part, and the strokes so far.
 pub(crate) struct Correction<'a> {
     frame: &'a Frame,
-    /// Colours around the box, and of the whole photo.
+    /// Colours around the box, and of the whole photo outside the box.
     surroundings: Option<ColorMixture>,
     pub in_part: Vec<bool>,
     /// The fixed side of a pixel, if a stroke set it.
@@ -192,7 +193,7 @@ fn mean<'a>(colors: impl Iterator<Item = &'a Lab>) -> Lab {
     Lab(sum.map(|sum| sum / count.max(1.0)))
 }
 
-/// The marked pixels and those around them, across and down, up to this many steps away.
+/// The marked pixels and those up to this many horizontal and vertical steps away.
 fn grown(marked: &[bool], width: usize, steps: usize) -> Vec<bool> {
     let mut grown = marked.to_vec();
     let mut rim: Vec<usize> = (0..marked.len()).filter(|&at| marked[at]).collect();

@@ -21,15 +21,15 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::error::EvaluationError;
 
-/// Maximum distance between a mark and the position of the demonstration's cut-out for both to be the same instance, in
-/// lengths of the mark.
+/// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration for both to
+/// be the same instance, in lengths of the line.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
 /// The pictures for testing a model.
 #[derive(Debug, Clone)]
 pub struct LabelledFolder {
     pub pictures: Vec<LabelledPicture>,
-    /// Other files of the folder.
+    /// Files of the folder that are left out.
     pub left_out: Vec<LeftOut>,
     /// Number of instances with labels of other objects.
     pub others: usize,
@@ -182,7 +182,7 @@ struct ReadPicture {
     labels: PathBuf,
     size: [u32; 2],
     instances: Vec<LabelledInstance>,
-    /// Positions at which the model's own demonstrations were cut out.
+    /// Grasp points of the model's own demonstrations that were cut out of this picture.
     taught: Vec<Point2<f64>>,
 }
 
@@ -204,7 +204,7 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Percept
 }
 
 impl ReadPicture {
-    /// The picture with the instances that count, and the positions of demonstrations in it.
+    /// The picture with the instances that count, and the grasp points of demonstrations in it.
     fn counted(self, label: Option<&str>) -> Result<(LabelledPicture, Vec<Point2<f64>>)> {
         let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
         let instances = counted.map(|instance| {

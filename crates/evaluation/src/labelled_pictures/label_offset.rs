@@ -1,4 +1,4 @@
-//! Detects labels that mark another grasp on the same part: all detections then have the same pose relative to their
+//! Detects labels that mark another grasp on the same part: most detections then have the same pose relative to their
 //! labels.
 //!
 //! ```text
@@ -17,7 +17,7 @@ use crate::statistics::Share;
 const MAX_OFFSET_DIAGONALS: f64 = 0.75;
 /// Minimum number of agreeing detections.
 const MIN_AGREEING: usize = 3;
-/// Minimum fraction of agreeing detections among all that hit no instance.
+/// Minimum fraction of agreeing detections among all that hit no instance but are near a label that was not found.
 const MIN_AGREEING_SHARE: f64 = 0.6;
 
 /// The common pose of detections relative to their labels.
@@ -28,7 +28,7 @@ pub struct LabelOffset {
     /// Mean offset along and across the label's direction, in percent of the part's diagonal.
     pub along_percent: f64,
     pub across_percent: f64,
-    /// Length of the mean offset in pixels.
+    /// Mean length of the offsets, in pixels.
     pub px: f64,
     /// Angle from the label's direction to the detection's, in (-180, 180].
     pub turn_deg: f64,

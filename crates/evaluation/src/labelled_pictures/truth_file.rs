@@ -129,7 +129,7 @@ impl RawInstance {
     }
 }
 
-/// The pictures of the file, each with the positions at which the model's own demonstrations were cut out.
+/// The pictures of the file, each with the grasp points of the model's own demonstrations that were cut out of it.
 ///
 /// # Errors
 /// The errors of [`TruthEntry::read_all`]; or pictures cannot be read.

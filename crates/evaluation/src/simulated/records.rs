@@ -116,7 +116,7 @@ impl AttemptsRecord {
     }
 }
 
-/// A model's detections in a picture.
+/// A model's best detection in a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DetectionRecord {
     /// Score of the best detection, accepted or not; zero if there is none.

@@ -60,7 +60,7 @@ impl Store {
     /// Like [`Self::open`], for one of several processes, which divide the units among themselves by other means.
     ///
     /// # Errors
-    /// The errors of [`Self::open`], the last one if a process has the folder exclusively.
+    /// The errors of [`Self::open`]; another process is an error only if it has the folder exclusively.
     pub fn open_shared(folder: &Path, settings: &Settings) -> Result<Self> {
         Self::open_with(folder, settings, Access::Shared)
     }

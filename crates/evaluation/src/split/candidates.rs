@@ -71,7 +71,7 @@ pub fn candidates(measured: &Measured) -> Result<String> {
 }
 
 fn of_picture<'a>(model: ModelKind, run: &'a SetRun, tested: &'a Tested) -> impl Iterator<Item = Candidate<'a>> {
-    // All candidates count: with a lower limit, the list of hits only becomes longer.
+    // All candidates count: a lower minimum score only makes the list of hits longer.
     let hits = judge(tested, 0.0).hits;
     tested.detections.iter().zip(hits).map(move |(detection, hit)| {
         let nearest = nearest(tested, detection);

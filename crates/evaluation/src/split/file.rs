@@ -59,8 +59,8 @@ struct SplitFile {
 /// Reads the sets of a split file.
 ///
 /// # Errors
-/// The file cannot be read, has an unknown side or field, two sets of the same name, or a symmetry with a fold below
-/// two.
+/// The file cannot be read, has an unknown side or field, two sets of the same name, or a symmetry with a fold outside
+/// 2 to 360.
 pub fn read_split(path: &Path) -> Result<Vec<SplitSet>> {
     let bytes = sdg_files::read(path, MAX_SPLIT_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|error| anyhow!("{}: expected UTF-8: {error}", path.display()))?;

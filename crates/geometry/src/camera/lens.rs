@@ -5,8 +5,8 @@
 //! x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²)
 //! y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2 y²) + 2 p2 x y
 //! ```
-//! Outside the calibrated picture, the fitted polynomial decreases again at some radius: it would map points beyond
-//! that radius back into the picture. Such points are treated as not visible.
+//! Outside the calibrated picture, the fitted polynomial may decrease again from some radius on: it would map points
+//! beyond that radius back into the picture. Such points are treated as not visible.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ impl PlumbBob {
         self.grows_up_to(point.coords.norm_squared()).then(|| self.polynomial(point))
     }
 
-    /// The point at depth 1 that the lens maps to this position; `None` if there is none.
+    /// The point at depth 1 that the lens maps to this position; `None` if none is found.
     pub fn undistort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         if *self == Self::NONE {
             return Some(*point);

@@ -46,12 +46,14 @@ impl PosedCamera {
         })
     }
 
-    /// The point of the plane z = `height_m` that appears at `pixel`; `None` when the ray misses the plane.
+    /// The point of the plane z = `height_m` that appears at `pixel`; `None` if the lens shows nothing there, or if the
+    /// ray misses the plane.
     pub fn at_height(&self, pixel: &Point2<f64>, height_m: f64) -> Option<Point3<f64>> {
         self.ray(pixel)?.at_height(height_m)
     }
 
-    /// Metres per pixel on the plane z = `height_m` near `pixel` (the mean of both axes); `None` off the plane.
+    /// Metres per pixel on the plane z = `height_m` near `pixel` (the mean of both axes); `None` as for
+    /// [`at_height`](Self::at_height).
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>, height_m: f64) -> Option<f64> {
         let here = self.at_height(pixel, height_m)?;
         let right = self.at_height(&Point2::new(pixel.x + 1.0, pixel.y), height_m)?;

@@ -132,7 +132,7 @@ fn coil(size: f32, radius: f32, rng: &mut Pcg64Mcg) -> Vec<[f32; 3]> {
     points
 }
 
-/// Centres the line and limits its size.
+/// Centres the line and scales its diagonal to `size`.
 fn fit(points: &mut [[f32; 3]], size: f32) {
     let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
     for p in points.iter() {
@@ -150,7 +150,7 @@ fn fit(points: &mut [[f32; 3]], size: f32) {
     }
 }
 
-/// Samples a bracket: a base with walls bent up, steps bent down, slopes and holes.
+/// Samples a bracket: level pieces joined by slopes, with walls bent up, holes and slots.
 pub(super) fn draw_sheet(rng: &mut Pcg64Mcg) -> Recipe {
     let mut builder = Builder::new(Material::draw(rng));
     let inner = builder.material(Material::metal(rng));

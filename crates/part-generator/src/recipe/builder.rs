@@ -67,7 +67,7 @@ impl Builder {
         whole.bounds()
     }
 
-    /// Reserves and returns a random free circle of `radius` on level ground.
+    /// Reserves a random free circle of `radius` on a level surface and returns its centre.
     pub fn room(&mut self, radius: f32, rng: &mut Pcg64Mcg) -> Option<[f32; 2]> {
         let b = self.bounds();
         for _ in 0..40 {
@@ -80,7 +80,7 @@ impl Builder {
         None
     }
 
-    /// Whether a circle is on level ground and free.
+    /// Whether a circle is on a level surface and free.
     pub fn is_free(&self, center: [f32; 2], radius: f32) -> bool {
         let clear = self.taken.iter().all(|&[x, y, taken]| (x - center[0]).hypot(y - center[1]) > taken + radius + 0.3);
         if !clear {

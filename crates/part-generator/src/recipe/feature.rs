@@ -177,7 +177,7 @@ pub(crate) struct Feature {
     pub operation: Operation,
     /// Index of its material.
     pub material: u8,
-    /// Features of one group move together; group 0 is the body and does not move.
+    /// Features of one group move together; of group 0, the body, only a corner, bend or shoulder moves.
     pub group: u16,
 }
 

@@ -111,7 +111,7 @@ pub struct SceneConfig {
     pub glare_probability: f64,
     /// Probability that the picture is compressed as JPEG.
     pub jpeg_probability: f64,
-    /// Minimum fraction of a part's silhouette inside the picture when it is placed.
+    /// Minimum fraction of a part's outline inside the picture when it is placed.
     pub min_inside_share: f64,
     /// Number of other parts to choose from.
     pub num_other_parts: usize,

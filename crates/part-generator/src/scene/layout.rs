@@ -32,8 +32,8 @@ impl<'a> Layout<'a> {
         Self { view, ground: Ground::new(bounds, 2.0 * view.mm_per_px()), bodies: Vec::new() }
     }
 
-    /// Places a part at a free position where at least the fraction `min_inside` of its box
-    /// is inside the picture.
+    /// Places a part at a free position where at least the fraction `min_inside` of its outline is inside the picture;
+    /// false if none is found.
     pub fn lay(&mut self, part: &Arc<Part>, min_inside: f32, rng: &mut Pcg64Mcg) -> bool {
         let (w, h) = (self.view.width as f32, self.view.height as f32);
         for _ in 0..MAX_TRIES {
@@ -47,7 +47,7 @@ impl<'a> Layout<'a> {
         false
     }
 
-    /// Moves a part towards a body until they touch.
+    /// Places a part so that it touches a body, by moving it towards the body; false if no position is found.
     pub fn lay_touching(&mut self, part: &Arc<Part>, neighbour: usize, rng: &mut Pcg64Mcg) -> bool {
         let middle = self.middle(neighbour);
         let step = 1.5 * self.view.mm_per_px();
@@ -72,7 +72,8 @@ impl<'a> Layout<'a> {
         false
     }
 
-    /// Places a cover on a body so that about the fraction `share` of it is covered.
+    /// Places a cover on a body so that about the fraction `share` of the body is covered; false if no position is
+    /// found.
     pub fn cover(&mut self, cover: &Arc<Part>, covered: usize, share: f32, rng: &mut Pcg64Mcg) -> bool {
         let points = self.cells_of(covered);
         let middle = self.middle(covered);
@@ -120,7 +121,7 @@ impl<'a> Layout<'a> {
         self.bodies[body].to_table([center.x as f32, center.y as f32])
     }
 
-    /// Positions of a body's coarsest cells.
+    /// Positions of the cells of a body's coarsest grid.
     fn cells_of(&self, body: usize) -> Vec<[f32; 2]> {
         let body = &self.bodies[body];
         let relief = &body.part.relief;

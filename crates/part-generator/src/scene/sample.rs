@@ -29,7 +29,7 @@ pub struct Instance {
 
 impl Instance {
     /// Outline of the complete silhouette, covered or not; may extend outside the picture. `None` for a silhouette
-    /// smaller than three pixels per side.
+    /// with fewer than 12 pixel edges, such as a square of 2 × 2 pixels.
     pub fn outline(&self) -> Option<Polygon> {
         self.silhouette.outline()
     }
@@ -70,9 +70,9 @@ pub struct Conditions {
     pub tilt_rad: f64,
     /// Little light and much noise.
     pub dark: bool,
-    /// Defocus: radius in pixels.
+    /// Defocus: standard deviation of the blur, in pixels of a picture 320 pixels wide; 0 without.
     pub blur_px: f64,
-    /// Camera motion during the exposure, in pixels.
+    /// Camera motion during the exposure, in pixels of a picture 320 pixels wide.
     pub motion_px: f64,
     /// Coloured light.
     pub tinted: bool,

@@ -15,13 +15,13 @@ const CURVE: usize = 1024;
 /// The properties of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sensor {
-    /// Exposure factor, before automatic exposure.
+    /// Exposure factor, in addition to the automatic exposure.
     pub exposure: f32,
     /// Gains of red, green, blue.
     pub white_balance: [f32; 3],
     /// Standard deviation of noise at middle grey, as a fraction of full scale.
     pub noise: f32,
-    /// Radius of blur in pixels.
+    /// Standard deviation of the blur, in pixels.
     pub blur: f32,
     /// Camera motion during the exposure, in pixels.
     pub motion: [f32; 2],

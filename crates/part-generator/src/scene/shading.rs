@@ -14,7 +14,7 @@ const GLOSS_STEP_PX: usize = 4;
 /// Spacing, in pixels, of computed reflections in a table with grain.
 const RIPPLE_STEP_PX: usize = 2;
 
-/// Slopes by which scratches tilt the reflected directions of a brushed surface.
+/// Slopes by which scratches tilt the normal of a brushed surface.
 const BRUSHED_SLOPES: [f32; 3] = [-0.22, 0.0, 0.22];
 
 /// The inputs of shading.
@@ -74,7 +74,7 @@ impl<'a> Shading<'a> {
         Self { scene, ground, shadows, contact_mm, mm_per_px, below: scene.table.mean(), surfaces, exposure }
     }
 
-    /// Writes the light from a row of the table to the camera: pixels from `first_px` on, at `py`.
+    /// Writes the light that reaches the camera from a row of the table: pixels from `first_px` on, at `py`.
     pub fn table_row(&self, view: &View, first_px: f32, py: f32, row: &mut TableRow, out: &mut [[f32; 3]]) {
         let Scene { lighting, table, .. } = self.scene;
         let sights = view.row(py);

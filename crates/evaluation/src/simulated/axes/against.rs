@@ -1,4 +1,4 @@
-//! Compares two runs on the same pictures: whether their models differ, and the number of pictures that would show it.
+//! Compares two runs on the same pictures: whether their models differ, and the number of cases that would show it.
 
 use std::path::{Path, PathBuf};
 

@@ -13,8 +13,8 @@ use crate::machine::machine;
 use crate::simulated::store::Store;
 
 impl AxesSummary {
-    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, `against` has the
-    /// comparisons with another run and its folder, and `command` reproduces the results.
+    /// Writes tables and a page, and returns their files. `jobs` is the number of parallel units, `comparisons` are
+    /// those with the run in the folder `other`, and `command` reproduces the results.
     ///
     /// # Errors
     /// Files cannot be written.

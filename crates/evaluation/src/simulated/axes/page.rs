@@ -51,7 +51,7 @@ fn worst_axes(group: &GroupSummary) -> Vec<(ModelKind, &AxisFigures)> {
     worst
 }
 
-/// One chart for each axis and each error.
+/// One chart for each axis, and one for the grasps under all errors.
 fn plots(group: &GroupSummary, mut section: Section) -> Section {
     let percent = |interval: [f64; 2]| interval.map(|share| 100.0 * share);
     let mut axes: Vec<&str> = group.axes.iter().map(|figures| figures.axis).collect();

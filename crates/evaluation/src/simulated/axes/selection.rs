@@ -3,7 +3,7 @@
 use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
 
-/// The error of an attempt, in the robot's settings or in the workcell.
+/// The error of an attempt, in the marks for teaching, in the robot's settings or in the workcell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GraspCondition {

@@ -25,7 +25,7 @@ use crate::simulated::one_unit::{NO_MODEL, do_unit};
 use crate::simulated::schedule::run_all;
 use crate::simulated::teaching::Teaching;
 
-/// Maximum number of pictures that are tried for a stratum.
+/// Maximum number of scenes that are tried for a picture.
 const MAX_DRAWINGS: u64 = 8;
 
 /// The result of a run.
@@ -39,8 +39,8 @@ pub struct RunEnd {
 
 impl AxesEvaluation<'_> {
     /// Runs the remaining units until `is_interrupted` returns true, and keeps finished units. A failed unit does not
-    /// end the others, so that hours of work do not depend on one part: its error is printed, and it is tried again in
-    /// the next run.
+    /// end the others, so that hours of work do not depend on one part: the error is printed, and the unit is tried
+    /// again in the next run.
     ///
     /// # Errors
     /// The store cannot be read. A teaching run without a model is not an error.
@@ -73,7 +73,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// The model of a cell, as it is measured.
+    /// The model of a cell, with this evaluation's number of search points.
     fn model(&self, cell: Cell, marks: Marks) -> Result<Option<GraspModel>> {
         let model = cell.read_model(marks, self.store)?;
         Ok(match (model, self.search_points) {
@@ -176,8 +176,8 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     }
 }
 
-/// Renders a picture of an axis. If a scene has no room for camera, cover or instances, the next picture of the same
-/// stratum is used.
+/// Renders a picture of an axis. If a scene has no room for camera, cover or instances, another scene for the same
+/// section of the axis is tried.
 pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {

@@ -18,7 +18,7 @@ pub enum PictureSet {
     Camera(usize),
     /// Pictures of the wrist camera along an axis of difficulty.
     Axis(Axis),
-    /// Pictures of all cameras, one after another, in which a part of another size replaces the part.
+    /// Pictures of all [`OTHER_CAMERAS`], one after another, in which a part of another size replaces the part.
     OtherSizes,
 }
 

@@ -41,7 +41,7 @@ pub struct SetFigures {
     pub found: Share,
     /// Pictures without the part in which a detection was accepted, of all without the part.
     pub accepted: Share,
-    /// Number of accepted detections that found no instance.
+    /// Number of accepted detections that found no instance, in pictures with the part.
     pub wrong: usize,
     /// Errors of the found instances.
     pub errors: Option<ErrorFigures>,

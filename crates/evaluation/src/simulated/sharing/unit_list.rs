@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::super::cell::{Cell, Marks, attempts_of};
 use super::super::units::Unit;
 
-/// Maximum size of a plan, larger than a plan of a hundred thousand units.
+/// Maximum size of a stored list, larger than a list of a hundred thousand units.
 const MAX_LIST_BYTES: u64 = 64 << 20;
 
 /// The kind of a unit's work, which is the first word of its name.
@@ -26,7 +26,7 @@ pub enum UnitKind {
 }
 
 impl UnitKind {
-    /// All kinds, in the order of the plan.
+    /// All kinds, in the order of the list.
     pub const ALL: [Self; 4] = [Self::Teach, Self::Look, Self::Grasp, Self::Time];
 
     /// The first word of the names of these units.
@@ -135,7 +135,7 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
     units
 }
 
-/// A plan stored in a folder, so that `--watch` needs no other arguments.
+/// A list of units that is stored in a folder, so that `--watch` needs no other arguments.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnitList {
     pub units: Vec<SavedUnit>,
@@ -154,7 +154,7 @@ impl UnitList {
         Self { units: units.iter().map(saved).collect() }
     }
 
-    /// Stores the plan in an evaluation's folder, unless it is there already.
+    /// Stores the list in an evaluation's folder, unless it is there already.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -162,7 +162,7 @@ impl UnitList {
         let mut bytes = serde_json::to_vec(self)?;
         bytes.push(b'\n');
         let plans = folder.join("plans");
-        // The name depends only on the content, so that each plan is stored once.
+        // The name depends only on the content, so that each list is stored once.
         let path = plans.join(format!("{:016x}.json", fnv1a(&bytes)));
         if path.exists() {
             return Ok(());
@@ -171,10 +171,10 @@ impl UnitList {
         Ok(write_atomically(&path, &bytes)?)
     }
 
-    /// All units of all plans in a folder; empty without a plan.
+    /// All units of all lists in a folder; empty without a list.
     ///
     /// # Errors
-    /// Plans cannot be read.
+    /// Lists cannot be read.
     pub fn read_all(folder: &Path) -> Result<Self> {
         let plans = folder.join("plans");
         let mut all = Self { units: Vec::new() };

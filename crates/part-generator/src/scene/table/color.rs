@@ -48,7 +48,7 @@ impl Table {
             }
             Pattern::Checks { pitch, color: other } => {
                 let (u, v) = (x / pitch, y / pitch);
-                // Distance to the next edge, with the sign of the square's colour.
+                // The colour changes within half a pixel of the nearest edge.
                 let odd = (floor(u) + floor(v)) & 1 == 1;
                 let d = to_line(x, *pitch).min(to_line(y, *pitch));
                 let share = (d * per_px + 0.5).clamp(0.0, 1.0);
