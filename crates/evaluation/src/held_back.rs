@@ -165,7 +165,7 @@ impl HeldBackFigures {
     pub fn in_words(&self) -> String {
         let interval = |share: Share| {
             let [low, high] = wilson_interval(share).map(|bound| 100.0 * bound);
-            format!("95 %: {low:.0} to {high:.0} %")
+            format!("95 % interval: {low:.0} to {high:.0} %")
         };
         let (found, false_alarms) = (self.found(), self.false_alarms());
         let errors = self.median_distance().zip(self.median_errors());
