@@ -39,8 +39,9 @@ pub fn draw_detections<'a>(
             draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
         }
     }
+    let mut taken: Vec<BoundingBox> = marked.iter().map(|detection| detection.bbox).collect();
     let marked: Vec<_> = marked.into_iter().map(|detection| (detection, detection.score >= min_score, None)).collect();
-    let mut taken = draw_marked(drawn, &marked);
+    taken.extend(draw_marked(drawn, &marked));
     for (detection, reason) in reasons {
         draw_reason(drawn, detection, reason, &mut taken);
     }
@@ -120,25 +121,54 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     }
 }
 
-/// Writes score and reason below a detection's box, or further down if there is another tag.
+/// Writes score and reason below a detection's box, or further down if a tag or an accepted part is there.
 fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
     let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
-    let text = format!("{:.2} refused: {reason}", detection.score);
+    let max_width = MAX_REASON_SHARE * f64::from(drawn.width());
+    let is_short = |text: &str| label_bounds(drawn, Point2::origin(), text, text_px).width() <= max_width;
+    let lines = wrapped(&format!("{:.2} refused: {reason}", detection.score), is_short);
     let step = 2.4 * text_px;
     let height = f64::from(drawn.height());
+    let tags = |first: Point2<f64>| -> Vec<(Point2<f64>, BoundingBox)> {
+        let place = |(row, line): (usize, &String)| {
+            let at = Point2::new(first.x, first.y + row as f64 * LINE_SHARE * step);
+            (at, label_bounds(drawn, at, line, text_px))
+        };
+        lines.iter().enumerate().map(place).collect()
+    };
     let below = |row: usize| {
         // Below the bottom of the picture, the position wraps to the top.
         let y = (detection.bbox.y2 + 3.0 * text_px + row as f64 * step) % (height + step);
         Point2::new(detection.bbox.x1, y)
     };
     let is_free = |at: &Point2<f64>| {
-        let bounds = label_bounds(drawn, *at, &text, text_px);
-        taken.iter().all(|other| other.intersection(&bounds) == 0.0)
+        let tags = tags(*at);
+        let is_inside = tags.last().is_some_and(|(at, _)| at.y <= height);
+        is_inside && tags.iter().all(|(_, tag)| taken.iter().all(|other| other.intersection(tag) == 0.0))
     };
     let rows = (height / step).ceil() as usize;
-    let at = (0..rows).map(below).find(is_free).unwrap_or_else(|| below(0));
-    taken.push(label_bounds(drawn, at, &text, text_px));
-    draw_label(drawn, at, &text, Color::REFUSED, text_px);
+    let first = (0..rows).map(below).find(is_free).unwrap_or_else(|| below(0));
+    for ((at, tag), line) in tags(first).into_iter().zip(&lines) {
+        taken.push(tag);
+        draw_label(drawn, at, line, Color::REFUSED, text_px);
+    }
+}
+
+/// Maximum width of a line of a reason, as a share of the picture's width; chosen by eye.
+const MAX_REASON_SHARE: f64 = 0.45;
+/// Distance of two lines of a reason, as a share of the distance of two reasons.
+const LINE_SHARE: f64 = 0.85;
+
+/// A text as lines that are short, or have one word.
+fn wrapped(text: &str, is_short: impl Fn(&str) -> bool) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if is_short(&format!("{line} {word}")) => *line = format!("{line} {word}"),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// A filled square of side 2 · `radius`, clipped to the picture.

@@ -211,7 +211,8 @@ fn checked_outline(image: &RgbImage, outline: &Polygon) -> Result<Polygon, Shape
         return Err(ShapeError::OutlineDegenerate { found: format!("a vertex at ({}, {})", v.x, v.y) });
     }
     let inside = outline.bounds().clip(f64::from(image.width()), f64::from(image.height()));
-    if inside.width().max(inside.height()) < MIN_EXTENT_PX {
+    let [short, long] = [inside.width().min(inside.height()), inside.width().max(inside.height())];
+    if short < 1.0 || long < MIN_EXTENT_PX {
         return Err(ShapeError::OutlineTooSmall {
             expected_px: MIN_EXTENT_PX,
             width: image.width(),

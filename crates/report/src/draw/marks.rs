@@ -12,6 +12,10 @@ use crate::html::format_number;
 
 /// Maximum width of a tag with a word, as a share of the width of its box; chosen by eye.
 const MAX_TAG_SHARE: f64 = 2.0;
+/// Maximum height of a tag's capitals, as a share of the diagonal of the box, unless this is below the minimum in
+/// pixels; chosen by eye.
+const MAX_TEXT_SHARE: f64 = 0.12;
+const MIN_TEXT_PX: f64 = 9.0;
 /// Maximum line width of a gripper, as a share of the grasp's width, so that it hides little of a small part's
 /// neighbours; chosen by eye.
 const MAX_GRIPPER_SHARE: f64 = 0.1;
@@ -116,7 +120,7 @@ pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec
     let num_grasps = occupied.len();
     for mark in marks {
         let number = mark.number.map(|number| format!("part {number}: ")).unwrap_or_default();
-        let height_px = 5.6 * width;
+        let height_px = mark.text_height_px(width);
         let score = format!("{number}{}", format_number(mark.score, 2));
         let in_words = format!("{score} {}", mark.verdict.word());
         let is_wide = |bounds: &BoundingBox| {
@@ -159,6 +163,12 @@ impl DetectionMark<'_> {
     /// The grasp, unless the detection is refused.
     fn grasped(&self) -> Option<PlanarGrasp> {
         self.grasp.filter(|_| self.verdict != Verdict::Refused)
+    }
+
+    /// Height of the tag's capitals: smaller at a small part.
+    fn text_height_px(&self, line_width: f64) -> f64 {
+        let by_box = self.bounds.map(|bounds| MAX_TEXT_SHARE * bounds.width().hypot(bounds.height()));
+        (5.6 * line_width).min(by_box.unwrap_or(f64::INFINITY).max(MIN_TEXT_PX))
     }
 
     /// Lower left corners of a tag of this width and height, the preferred one first: above the box, below it, and inside
