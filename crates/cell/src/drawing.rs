@@ -143,7 +143,11 @@ fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, t
     };
     let is_free = |at: &Point2<f64>| {
         let tags = tags(*at);
-        let is_inside = tags.last().is_some_and(|(at, _)| at.y <= height);
+        // At an edge, several lines would be moved over each other.
+        let is_inside = match tags.as_slice() {
+            [(top, first), .., (bottom, _)] => first.height() <= top.y && bottom.y <= height,
+            _ => true,
+        };
         is_inside && tags.iter().all(|(_, tag)| taken.iter().all(|other| other.intersection(tag) == 0.0))
     };
     let rows = (height / step).ceil() as usize;
