@@ -11,8 +11,10 @@ copied once, and the GIL is released during computations. Units are in the names
 from __future__ import annotations
 
 import json
+import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf
 from os import PathLike, fspath
 from operator import index
 from pathlib import Path
@@ -97,11 +99,13 @@ class Camera:
 
         Raises FileError and CameraError.
         """
-        return cls(_native.Camera.load(path))
+        return cls(_native.Camera.load(_path("path", path)))
 
     @classmethod
     def from_yaml(cls, text: str) -> "Camera":
         """Reads a camera from the text of a file. Raises CameraError."""
+        if not isinstance(text, str):
+            raise ArgumentError(f"expected the text of a camera file, found {_type(text)}")
         return cls(_native.Camera.from_yaml(text))
 
     @property
@@ -124,11 +128,11 @@ class GraspModel:
     @classmethod
     def load(cls, path: _Path) -> "GraspModel":
         """Reads a model file. Raises FileError and ModelFileError."""
-        return cls(_native.Model.load(path))
+        return cls(_native.Model.load(_path("path", path)))
 
     def save(self, path: _Path) -> None:
         """Writes the model file atomically; it replaces only an existing grasp model. Raises FileError."""
-        self._native.save(path)
+        self._native.save(_path("path", path))
 
     @property
     def model(self) -> str:
@@ -161,10 +165,9 @@ class GraspModel:
         Raises PictureError, CameraError, RegionError and ArgumentError. For a picture without the part, the list is empty, and
         its `.best` raises NothingToGrasp.
         """
-        if not 0 <= min_score <= 1:
-            raise ArgumentError(f"expected min_score from 0 to 1, found {min_score}")
+        min_score = _number("min_score", min_score, 0, 1)
         found = self._native.detect(
-            _checked(array), channels, _native_of(camera), _checked_region(region), _checked_threads(threads)
+            _checked(array), _channels(channels), _native_of(camera), _checked_region(region), _checked_threads(threads)
         )
         return Detections([Detection.of(record) for record in json.loads(found)], min_score)
 
@@ -191,7 +194,7 @@ class Tracker:
         if search_frames is not None:
             search_frames = _whole("search_frames", search_frames, 0, _MAX_SEARCH_FRAMES)
         self._native = _native.Tracker(
-            model._native, _native_of(camera), _checked_region(region), _checked_threads(threads), search_frames
+            _native_model(model), _native_of(camera), _checked_region(region), _checked_threads(threads), search_frames
         )
 
     def frame(self, array: _Array, captured_s: float, channels: str = "rgb") -> list[TrackedPart]:
@@ -201,7 +204,8 @@ class Tracker:
 
         Raises ClosedError after `close`, and the exceptions of `GraspModel.detect`.
         """
-        records = json.loads(self._native.frame(_checked(array), channels, captured_s))
+        captured_s = _number("captured_s", captured_s)
+        records = json.loads(self._native.frame(_checked(array), _channels(channels), captured_s))
         return [TrackedPart.of(record) for record in records]
 
     def close(self) -> None:
@@ -222,7 +226,7 @@ def read_picture(path: _Path, camera: Optional[Camera] = None) -> _Array:
 
     Raises FileError and PictureError.
     """
-    height, width, pixels = _native.read_picture(path, _native_of(camera))
+    height, width, pixels = _native.read_picture(_path("path", path), _native_of(camera))
     return np.frombuffer(pixels, np.uint8).reshape(height, width, 3)
 
 
@@ -263,15 +267,16 @@ def teach(
     """
     if (camera is None) != (mark_height_mm is None):
         raise ArgumentError("expected camera and mark_height_mm together, found one without the other")
-    if time_budget_s is not None and not 0 < time_budget_s < 1e9:
+    if time_budget_s is not None and not 0 < _number("time_budget_s", time_budget_s) < 1e9:
         raise ArgumentError(f"expected time_budget_s of more than 0 seconds, found {time_budget_s}")
     of_camera = None
     if camera is not None and mark_height_mm is not None:
-        grasp_mm = 0.5 * mark_height_mm if grasp_height_mm is None else grasp_height_mm
-        for name, value in [("mark_height_mm", mark_height_mm), ("grasp_height_mm", grasp_mm)]:
+        mark_mm = _number("mark_height_mm", mark_height_mm)
+        grasp_mm = 0.5 * mark_mm if grasp_height_mm is None else _number("grasp_height_mm", grasp_height_mm)
+        for name, value in [("mark_height_mm", mark_mm), ("grasp_height_mm", grasp_mm)]:
             if not (value == 0 or 0.1 <= value <= 500):
                 raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {value}: metres given as millimetres?")
-        of_camera = (camera, 1e-3 * mark_height_mm, 1e-3 * grasp_mm)
+        of_camera = (_path("camera", camera), 1e-3 * mark_mm, 1e-3 * grasp_mm)
     # 0 for full symmetry.
     turns = 0
     if symmetry != "full":
@@ -281,34 +286,44 @@ def teach(
     seed = _whole("seed", seed, 0, _MAX_SEED)
     if steps is not None:
         steps = _whole("steps", steps, 1, _MAX_STEPS)
-    smallest, largest = size_tolerance
+    smallest, largest = (
+        _number("size_tolerance", size) for size in _pair("size_tolerance=(smallest, largest)", size_tolerance)
+    )
     if not (0.5 <= smallest <= 1 <= largest <= 2):
         raise ArgumentError(
             f"expected size_tolerance=(smallest, largest), from 0.5 to 1 and from 1 to 2, found {size_tolerance}"
         )
     bounds = None if region is None else _bounds(region)
+    for name, text in [("model", model), ("preset", preset)]:
+        if not isinstance(text, str):
+            raise ArgumentError(f"expected {name}, a string, found {_type(text)}")
+    pairs = {"": (photo, marks)}
+    for number, demo in enumerate(_list("more_demos", more_demos)):
+        pairs[f"more_demos[{number}] "] = _pair("more_demos of pairs (photo, marks)", demo)
     with tempfile.TemporaryDirectory() as folder:
         demonstrations: list[tuple[_Path, _Path]] = []
-        for of_photo, of_marks in [(photo, marks), *more_demos]:
+        for number, (where, (of_photo, of_marks)) in enumerate(pairs.items()):
+            of_photo = _path(f"{where}photo", of_photo)
             if isinstance(of_marks, Mapping):
-                marks_file = Path(folder, str(len(demonstrations)), f"{Path(fspath(of_photo)).stem}.json")
-                marks_file.parent.mkdir()
-                marks_file.write_text(json.dumps(of_marks), encoding="utf-8")
-                of_marks = marks_file
-            demonstrations.append((of_photo, of_marks))
-        taught = _native.teach(
-            demonstrations,
-            model,
-            preset,
-            seed,
-            steps,
-            time_budget_s,
-            turns,
-            (smallest, largest),
-            bounds,
-            of_camera,
-            list(negatives),
-        )
+                of_marks = _file_of(of_marks, Path(folder, str(number), f"{where}marks of {Path(of_photo).stem}.json"))
+            demonstrations.append((of_photo, _path(f"{where}marks, a dictionary", of_marks)))
+        try:
+            taught = _native.teach(
+                demonstrations,
+                model,
+                preset,
+                seed,
+                steps,
+                time_budget_s,
+                turns,
+                (smallest, largest),
+                bounds,
+                of_camera,
+                [_path("negatives", path) for path in _list("negatives", negatives)],
+            )
+        except SdgError as error:
+            # The caller does not know the files in this folder.
+            raise type(error)(re.sub(rf"{re.escape(folder)}/\d+/(.*?)\.json", r"\1", str(error))) from None
     return GraspModel(taught)
 
 
@@ -331,14 +346,14 @@ def evaluate(
     with tempfile.TemporaryDirectory() as unkept:
         figures: dict[str, Any] = json.loads(
             _native.evaluate(
-                model._native,
-                folder,
+                _native_model(model),
+                _path("folder", folder),
                 _native_of(camera),
                 _checked_region(region),
                 _checked_threads(threads),
                 label,
-                min_score,
-                report if report is not None else unkept,
+                _number("min_score", min_score, 0, 1),
+                _path("report", report) if report is not None else unkept,
             )
         )
     if report is None:
@@ -346,14 +361,86 @@ def evaluate(
     return figures
 
 
+def _type(value: object) -> str:
+    return type(value).__name__
+
+
 def _native_of(camera: Optional[Camera]) -> Optional[_native.Camera]:
-    return None if camera is None else camera._native
+    if camera is None:
+        return None
+    if not isinstance(camera, Camera):
+        raise CameraError(f"expected an sdg.Camera (Camera.load reads one from a file), found {_type(camera)}")
+    return camera._native
+
+
+def _native_model(model: GraspModel) -> _native.Model:
+    if not isinstance(model, GraspModel):
+        raise ArgumentError(f"expected an sdg.GraspModel (GraspModel.load reads one from a file), found {_type(model)}")
+    return model._native
+
+
+def _path(name: str, value: _Path) -> str:
+    try:
+        path = fspath(value)
+    except TypeError:
+        path = None
+    if not isinstance(path, str):
+        raise ArgumentError(f"expected {name}, a str or a pathlib.Path, found {_type(value)}")
+    return path
+
+
+def _list(name: str, values: Any) -> list[Any]:
+    # A string would be read letter by letter.
+    if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
+        raise ArgumentError(f"expected {name}, a list, found {_type(values)}")
+    return list(values)
+
+
+def _pair(what: str, values: Any) -> tuple[Any, Any]:
+    found = _list(what, values)
+    if len(found) != 2:
+        raise ArgumentError(f"expected {what}, found {values!r}")
+    return found[0], found[1]
+
+
+def _number(name: str, value: Any, least: float = -inf, most: float = inf) -> float:
+    """A number of any type of Python or numpy, within bounds."""
+    number = None
+    if not isinstance(value, str):
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            pass
+    if number is None:
+        raise ArgumentError(f"expected {name}, a number, found {value!r}")
+    if not least <= number <= most and (least, most) != (-inf, inf):
+        raise ArgumentError(f"expected {name} from {least:g} to {most:g}, found {value}")
+    return number
+
+
+def _channels(channels: str) -> str:
+    if not isinstance(channels, str):
+        raise ArgumentError(f'expected channels "rgb" or "bgr", found {_type(channels)}')
+    return channels
+
+
+def _file_of(marks: Mapping[str, Any], path: Path) -> Path:
+    """Writes marks to a file; numpy's arrays and numbers become lists and numbers."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, (np.ndarray, np.generic)):
+            return value.tolist()
+        raise ArgumentError(f"expected marks with the contents of a JSON file, found {_type(value)}")
+
+    path.parent.mkdir()
+    path.write_text(json.dumps(marks, default=plain), encoding="utf-8")
+    return path
 
 
 def _checked(array: Any) -> _Array:
     """Checks an array and returns it as exactly numpy.ndarray, without a copy."""
     if not isinstance(array, np.ndarray):
-        raise PictureError(f"expected a numpy.ndarray, found {type(array).__name__}")
+        raise PictureError(f"expected a numpy.ndarray, found {_type(array)}")
     return np.asarray(array)
 
 

@@ -101,6 +101,7 @@ class Detections(list[Detection]):
 
     def __init__(self, found: list[Detection], min_score: float) -> None:
         super().__init__(one for one in found if one.score >= min_score)
+        self._min_score = min_score
         self.refused = [one for one in found if one.score < min_score]
 
     @property
@@ -117,4 +118,9 @@ class Detections(list[Detection]):
             text = f"expected a part to grasp, found none: the best place scores {first.score:.2f}"
             if first.refused:
                 text += f": {first.refused}"
+            else:
+                text = (
+                    f"expected a part to grasp with a score of at least {self._min_score:g} (min_score), "
+                    f"found {first.score:.4f} at most"
+                )
         raise NothingToGrasp(text)

@@ -144,6 +144,8 @@ def test_regions(region: Any, shape_model: sdg.GraspModel) -> None:
         ({"threads": 1 << 30}, "found 1073741824"),
         ({"min_score": 1.5}, "min_score from 0 to 1, found 1.5"),
         ({"min_score": float("nan")}, "min_score from 0 to 1, found nan"),
+        ({"min_score": "high"}, "expected min_score, a number, found 'high'"),
+        ({"channels": None}, 'expected channels "rgb" or "bgr", found NoneType'),
     ],
 )
 def test_arguments_of_detect(arguments: dict[str, Any], words: str, shape_model: sdg.GraspModel) -> None:
@@ -167,16 +169,61 @@ def test_arguments_of_detect(arguments: dict[str, Any], words: str, shape_model:
         {"size_tolerance": (1.4, 0.8)},
         {"mark_height_mm": 10.0},
         {"camera": made_pictures.CAMERA, "mark_height_mm": 0.01},
+        {"camera": made_pictures.CAMERA, "mark_height_mm": "16"},
+        {"camera": 7, "mark_height_mm": 16},
+        {"model": 5},
+        {"size_tolerance": 1.2},
+        {"size_tolerance": (0.8, None)},
+        {"negatives": "negative.png"},
+        {"negatives": [None]},
+        {"more_demos": ["a"]},
+        {"more_demos": [(made_pictures.PHOTO, None)]},
+        {"photo": GREY},
+        {"marks": None},
+        {"marks": {"shapes": {1, 2}}},
     ],
 )
 def test_arguments_of_teach(arguments: dict[str, Any]) -> None:
     with pytest.raises(sdg.ArgumentError, match="expected"):
-        sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, **{"model": "S", **arguments})
+        sdg.teach(**{"photo": made_pictures.PHOTO, "marks": made_pictures.MARKS, "model": "S", **arguments})
+
+
+def test_paths_and_objects_of_another_type(shape_model: sdg.GraspModel) -> None:
+    anything: Any = "part.sdg"
+    with pytest.raises(sdg.CameraError, match="expected an sdg.Camera .*, found str"):
+        shape_model.detect(GREY, camera=anything)
+    with pytest.raises(sdg.CameraError, match="found str"):
+        sdg.read_picture(made_pictures.PHOTO, anything)
+    calls: list[Callable[[], object]] = [
+        lambda: sdg.Tracker(anything),
+        lambda: sdg.evaluate(anything, "folder"),
+        lambda: sdg.evaluate(shape_model, None),  # type: ignore[arg-type]
+        lambda: sdg.GraspModel.load(None),  # type: ignore[arg-type]
+        lambda: sdg.Camera.from_yaml(b""),  # type: ignore[arg-type]
+        lambda: shape_model.save(None),  # type: ignore[arg-type]
+    ]
+    for call in calls:
+        with pytest.raises(sdg.ArgumentError, match="expected .*, found (str|NoneType|bytes)"):
+            call()
+
+
+def test_a_model_that_was_read_can_be_replaced(models: dict[str, Path], tmp_path: Path) -> None:
+    file = tmp_path / "model.sdg"
+    file.write_bytes(models["S"].read_bytes())
+    model = sdg.GraspModel.load(file)
+    model.save(file)
+    assert sdg.GraspModel.load(file).object == model.object
+
+
+def test_the_best_below_an_own_limit_names_it(shape_model: sdg.GraspModel) -> None:
+    found = shape_model.detect(sdg.read_picture(made_pictures.PHOTO), min_score=1.0)
+    with pytest.raises(sdg.NothingToGrasp, match=r"score of at least 1 \(min_score\), found 0\.9\d\d\d at most"):
+        found.best
 
 
 def test_marks_that_nothing_can_be_taught_from() -> None:
     for marks in ({}, {"shapes": []}):
-        with pytest.raises(sdg.TeachingError):
+        with pytest.raises(sdg.TeachingError, match="^marks of image: expected"):
             sdg.teach(made_pictures.PHOTO, marks, model="S")
     with pytest.raises(sdg.TeachingError):
         sdg.teach(made_pictures.PHOTO, made_pictures.DEMONSTRATIONS / "key" / "image.png", model="S")

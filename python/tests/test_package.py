@@ -1,6 +1,7 @@
 """Tests that the guide's code runs, that the package is typed, documented and within its size limit, and that it has the command."""
 
 import inspect
+import json
 import os
 import re
 import shutil
@@ -8,6 +9,8 @@ import subprocess
 import sys
 from importlib import metadata, resources
 from pathlib import Path
+
+import numpy as np
 
 import made_pictures
 import sdg
@@ -41,6 +44,15 @@ def test_the_guide_runs_as_written(tmp_path: Path) -> None:
     forward, left, up = (float(number) for number in re.search(r"frame base: \((.*), (.*), (.*)\) m", done.stdout).groups())
     assert abs(up - 0.009) < 1e-3
     assert "followed" in done.stdout
+
+
+def test_marks_as_a_dictionary_with_arrays() -> None:
+    marks = json.loads(made_pictures.MARKS.read_text())
+    for shape in marks["shapes"]:
+        shape["points"] = np.array(shape["points"])
+    photo = sdg.read_picture(made_pictures.PHOTO)
+    [one, other] = (sdg.teach(made_pictures.PHOTO, given, model="S") for given in (marks, made_pictures.MARKS))
+    assert one.detect(photo) == other.detect(photo)
 
 
 def test_everything_public_is_documented() -> None:

@@ -102,7 +102,8 @@ impl Model {
     /// The path is a file of another kind, or cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         check_replaces_a_model(path).map_err(Fault::of_kind(FaultKind::File))?;
-        Ok(sdg_files::write(path, &self.model.to_bytes()?)?)
+        // A program that keeps running may replace a model that it has read.
+        Ok(sdg_files::extend(path, Some(path), &self.model.to_bytes()?)?)
     }
 
     /// The grasp model.
