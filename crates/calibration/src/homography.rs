@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Point2, Vector3};
 
 /// The homography from points of a plane to pixels, by least squares of the normalised linear equations. `None` if the
-/// points do not determine it: fewer than four, or all on a line.
+/// points do not determine it, such as fewer than four, or points on a line.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, algorithm 4.2.

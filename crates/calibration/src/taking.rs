@@ -21,7 +21,7 @@ const NEW_SHAPE_SHARE: f64 = 0.0125;
 /// The state of the board in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// The board moves.
+    /// The board moves, or has not been at rest for enough frames.
     Moving,
     /// At rest, in a view that was taken already.
     Known,
@@ -78,7 +78,7 @@ impl PictureTaker {
         if self.taken.iter().any(is_known) { Sight::Known } else { Sight::New }
     }
 
-    /// Processes a next frame without the board.
+    /// Processes the next frame, which does not show the board.
     pub fn lose(&mut self) {
         self.still = None;
     }

@@ -133,7 +133,7 @@ fn what_is_no_board_is_told_by_what_is_missing() {
     assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
 }
 
-/// Too little of the board is visible; parts of a grid may be found.
+/// Whether the error states that too little of the board is visible; parts of a grid may have been found.
 fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
     use CalibrationError::{BoardNotFound, BoardUnclear, OtherCheckerboard};
     matches!(found, Err(BoardNotFound { .. } | BoardUnclear { .. } | OtherCheckerboard { .. }))

@@ -81,7 +81,7 @@ fn a_board_of_the_told_size_is_not_blamed_where_pictures_are_few() {
         let views = views(Mount::Hand, 7000 + seed, &turned_only);
         assert!(solve(Mount::Hand, &views[..6]).is_ok(), "{seed}");
     }
-    // A third of a percent is the reading error of a ruler.
+    // A difference of up to 0.3 percent is the reading error of a ruler.
     assert!(solve_told(Mount::Hand, &views(Mount::Hand, 3, &EXACT_ROBOT), 1.002).is_ok());
 }
 

@@ -113,7 +113,7 @@ pub(super) fn grow_all(saddles: &[Saddle]) -> Vec<Grid> {
 struct Growth<'a> {
     saddles: &'a [Saddle],
     members: BTreeMap<Place, usize>,
-    /// Steps to the next place along i and j, by place.
+    /// Steps to the next positions along i and j, by position.
     steps: BTreeMap<Place, [Vector2<f64>; 2]>,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Growth<'a> {
         self.members
     }
 
-    /// The step to the next position: the last step along this axis, or the step of the neighbouring row.
+    /// The step to the next position: that of a neighbouring row if known, otherwise the last step along this axis.
     fn step(&self, [i, j]: Place, axis: usize, sign: f64) -> Vector2<f64> {
         let [along, across] = if axis == 0 { [[1, 0], [0, 1]] } else { [[0, 1], [1, 0]] };
         let sign_i = sign as i32;

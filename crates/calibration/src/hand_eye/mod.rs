@@ -63,8 +63,9 @@ pub struct HandEye {
 }
 
 impl HandEye {
-    /// The camera with its pose, on the hand or above the table. `table_height_m` is the table's z in the base frame;
-    /// `None` keeps the height of the camera file if that is in the base frame; otherwise it is 0.
+    /// The camera with its pose, on the hand or above the table. `table_height_m` is the table's z in the base frame,
+    /// used for [`Mount::Base`]. `None` keeps the height in `camera` if its `table` is in the base frame; otherwise the
+    /// height is 0.
     pub fn mounted(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
         match mount {
             Mount::Hand => CalibratedCamera { flange_from_camera: Some(self.frame_from_camera), ..camera },

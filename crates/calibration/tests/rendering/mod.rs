@@ -121,7 +121,7 @@ pub fn render_with(
             (false, false) => 0.5 * (exposure.ink + exposure.paper),
         }
     };
-    // Four pixels have a common corner.
+    // A corner belongs to up to four pixels; its brightness is computed once.
     let places: Vec<Option<(Point2<f64>, f64)>> =
         places.into_iter().map(|place| place.map(|place| (place, brightness(&place)))).collect();
     let mut values = vec![0.5 * (exposure.ink + exposure.paper); width * height];
