@@ -60,7 +60,7 @@ pub enum NodeName {
     Any,
     /// The node with this path.
     Path(PathBuf),
-    /// The first node whose card name contains this text, ignoring case.
+    /// The first node with a supported format whose card name contains this text, ignoring case.
     Card(String),
 }
 

@@ -17,7 +17,7 @@ use crate::watched::Watched;
 
 /// Range of requested frame rates, in frames per second.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
-/// Range of stall timeouts: longer than the time of a frame, at most an hour.
+/// Range of stall timeouts.
 const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
 
 /// Opens the camera at an address. The camera is reopened if its connection is lost, and its frames are checked for

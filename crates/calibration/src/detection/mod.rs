@@ -1,9 +1,9 @@
 //! Finds the board in a picture: corners with subpixel accuracy, each with its position on the board.
 //!
 //! ```text
-//! picture ─ halved step by step ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
-//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution         dots.rs, refine.rs
-//!         ─ rejected if the corners are not in a plane or brightness varies within squares             acceptance.rs
+//! picture ─ halved step by step ─ saddle points ─ grid grown from neighbour to neighbour        saddle.rs, grid.rs
+//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution  dots.rs, refine.rs
+//!         ─ rejected if the corners are not in a plane or brightness varies within squares      acceptance.rs
 //! ```
 //! A grid is extended from its last steps, so that distortion and perspective need not be known. The first pixel's
 //! centre is at (0.5, 0.5).
