@@ -160,7 +160,7 @@ fn with_noisy_robot_poses_we_are_nearer_than_every_method_of_opencv() {
             );
             assert!(mm[0] < number("median_mm") && deg[0] < number("median_deg"), "{name}: {method} is nearer");
         }
-        // The sums of squares of the estimated and the true errors are similar.
+        // The root sums of squares of the estimated and the true errors are similar.
         let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
         let told = 1000.0 * squares(&mut found.iter().map(|found| found.sigma_m));
         let ratio = squares(&mut all.iter().map(|errors| errors[0])) / told;

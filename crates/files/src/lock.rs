@@ -31,7 +31,7 @@ impl Lock {
         Ok(is_taken.then_some(Self(file)))
     }
 
-    /// Whether no process holds the lock of a file; false if there is no such file, or no locks.
+    /// Whether no process holds the exclusive lock of a file; false if there is no such file, or no locks.
     pub fn is_free(path: &Path) -> bool {
         File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
     }

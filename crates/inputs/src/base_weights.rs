@@ -65,7 +65,7 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
 /// Reads the weights in `path` for `network`, without the parts named in `reinitialized`. If the file contains only a
 /// backbone, the rest of the network is initialised randomly and need not be named.
 ///
-/// `tell` receives the report before any error.
+/// `tell` receives the report of the conversion before the values are read.
 ///
 /// # Errors
 /// The file cannot be read, the weights are for another network or another image input, or a named part does not exist.

@@ -182,7 +182,8 @@ impl TrajectoryArm {
     }
 }
 
-/// The error of a motion that was then cancelled: after a stop that failed, the robot may still move.
+/// The error to report for a motion that failed with `error` and was then cancelled. If the cancellation of a stopped
+/// motion failed, that error is reported, because the robot may still move.
 fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
     match (error, cancelled) {
         (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,
@@ -309,7 +310,7 @@ impl Arm for TrajectoryArm {
         let (end, result) = match self.hand_end(goal, watch) {
             Ok(ended) => ended,
             Err(error) => {
-                // The fingers may still move. If they cannot be stopped now, `stop` tries it again.
+                // The fingers may still move. If they cannot be stopped now, a later call of `stop` tries again.
                 self.hand = Some((command, goal));
                 let stopped = self.stop();
                 return Err(more_serious(error, stopped));
@@ -357,7 +358,8 @@ impl Arm for TrajectoryArm {
         Ok(())
     }
 
-    /// Recovers nothing, because errors are recovered at the arm's driver.
+    /// Recovers nothing, because errors are recovered at the arm's driver. Forgets the commanded position, and checks
+    /// that joint states arrive.
     fn recover(&mut self) -> Result<()> {
         self.commanded = None;
         self.known().map(drop)
