@@ -185,7 +185,7 @@ impl CalibratedCamera {
         self.sections().into_iter().map(|(_, section)| section).collect()
     }
 
-    /// Returns an existing file with this camera's values. Data of other programs and comments are kept.
+    /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept.
     ///
     /// # Errors
     /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.

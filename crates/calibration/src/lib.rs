@@ -12,7 +12,8 @@
 //! added when such a file is read and subtracted when it is written. The board's origin is the outer corner of its
 //! lower left dark square, x right, y up, z out of the sheet. Lengths are in metres; `z` points up from the table.
 //!
-//! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Files and clocks are in `cli`.
+//! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Not in this crate: access to files
+//! (crates `inputs` and `cli`) and clocks.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Vector3};

@@ -19,7 +19,7 @@ const MAX_STALLS: u32 = 3;
 /// Number of torn frames in a row after which the connection is dropped: the frame boundaries may be lost.
 const MAX_TORN: u32 = 30;
 
-/// Opens a connection; the deadline applies if the operating system supports one.
+/// Opens a connection; the deadline applies only to HTTP.
 pub(crate) type Opener = Box<dyn FnMut(Instant) -> Result<Box<dyn Source>, CameraError> + Send>;
 
 /// A camera that is reopened; frames are numbered across its connections.

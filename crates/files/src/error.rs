@@ -81,7 +81,7 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// For `map_err`: wraps the system's error at a step with a file.
+    /// Returns a function for `map_err` that adds the path and the step to the system's error.
     pub(crate) fn at(path: &std::path::Path, step: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::System { path, step, source }

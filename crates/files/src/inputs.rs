@@ -26,7 +26,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     Ok((file, metadata.len()))
 }
 
-/// Whether a file can be opened.
+/// Checks that a file can be opened, and registers it as an input.
 ///
 /// # Errors
 /// The file cannot be opened (its name and the system's error), or is a folder.

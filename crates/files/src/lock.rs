@@ -21,7 +21,8 @@ pub enum Access {
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 
 impl Lock {
-    /// Takes the lock of the file at `path`, which is created if missing; `None` if another process holds it.
+    /// Takes the lock of the file at `path`, which is created if missing; `None` if another process
+    /// holds a lock that excludes this access.
     ///
     /// # Errors
     /// The file cannot be written.

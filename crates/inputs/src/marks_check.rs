@@ -87,7 +87,8 @@ impl MarkedPhoto<'_> {
     /// Like [`Self::upright`], for a demonstration, in which the part must be clearly visible.
     ///
     /// # Errors
-    /// The errors of [`Self::upright`]; or the marks fit in another reading, or name another existing picture.
+    /// The errors of [`Self::upright`]; or the marks fit in another reading of their numbers; or their file names
+    /// another existing picture.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();

@@ -26,7 +26,7 @@ pub(super) struct Picture {
     pub(super) captured: SystemTime,
 }
 
-/// Counters.
+/// Counters for the diagnostics.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     pub(super) received: AtomicU64,

@@ -24,8 +24,8 @@ const MIN_MARGIN: f64 = 1.5;
 const MAX_OUTSIDE: usize = 2;
 /// If the mean of the squares' values is below half of this, the board is a plain checkerboard.
 const MAX_PLAIN: f64 = 0.3;
-/// Distance of the sample points of a square's own colour from its centre, in sides: outside a dot and inside the
-/// edges.
+/// Distance from a square's centre of the points at which the square's own colour is sampled, in sides: outside a dot
+/// and inside the edges.
 const RING: f64 = 0.32;
 
 /// Finds the grid's placement on the board.

@@ -16,7 +16,7 @@ pub(super) type Place = [i32; 2];
 /// The four neighbours of a position: offset, axis and sign.
 const NEIGHBOURS: [(Place, usize, f64); 4] =
     [([1, 0], 0, 1.0), ([-1, 0], 0, -1.0), ([0, 1], 1, 1.0), ([0, -1], 1, -1.0)];
-/// Largest distance of a neighbour from the position predicted by the last step, in steps. Perspective shortens steps
+/// Largest distance of a neighbour from its predicted position, in steps. Perspective shortens steps
 /// by up to a sixth.
 const MAX_OFF: f64 = 0.3;
 /// Largest deviation of the first neighbours from the edges' directions: the sine of 14 degrees.

@@ -43,7 +43,8 @@ const READINGS: [(&str, bool, OfPose); 8] = [
     ("the rotations seem to be transposed, and the mount to be the other one", true, |pose| transposed(pose).inverse()),
 ];
 
-/// Largest fraction of the closed form's residual with the given rotations that may remain with other rotations.
+/// A reading of Euler angles is kept if its closed-form residual is below this fraction of the residual of the given
+/// rotations.
 const MAX_TURNS_SHARE: f64 = 0.5;
 /// Number of readings of Euler angles that are evaluated further: the most likely of those with the smallest residuals.
 const NUM_EULER: usize = 3;

@@ -131,7 +131,8 @@ fn too_few(found: usize, hint: &'static str) -> CalibrationError {
     CalibrationError::TooFewPictures { least: MIN_PICTURES, found, hint }
 }
 
-/// The better of two results: starting at the closed form's focal length, and at the picture's longer side.
+/// The better of two minima: one from the closed form's focal length, the other from the picture's longer side as the
+/// focal length.
 fn first_fit<'a>(
     board: &Board,
     pictures: &'a [Vec<SeenCorner>],
@@ -228,7 +229,7 @@ fn alike(bundle: &Bundle<'_>, hint: String) -> CalibrationError {
     CalibrationError::PosesAlike { found: format!("tilts that differ by {range:.0} degrees at most"), hint }
 }
 
-/// The result for every picture with the camera, including the excluded ones.
+/// The result for every picture with the estimated camera, including the excluded pictures.
 fn fits(
     board: &Board,
     pictures: &[Vec<SeenCorner>],

@@ -33,7 +33,7 @@ pub struct TopicAddress {
     pub is_reliable: bool,
     /// The domain: `ROS_DOMAIN_ID`, unless the option gives another one.
     pub domain_id: u16,
-    /// Whether only this computer is used.
+    /// Whether only connections within this computer are used.
     pub is_loopback_only: bool,
 }
 
