@@ -28,7 +28,7 @@ pub(crate) fn fit(places: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>>
     let eigen = normal.symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // A second undetermined direction: the points lie on a line.
+    // A second undetermined direction, as for points on a line.
     if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
         return None;
     }

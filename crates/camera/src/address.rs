@@ -76,7 +76,7 @@ pub struct Playback {
 }
 
 impl Address {
-    /// Whether the source is live, so that unread frames are lost. Pictures in files and folders are never lost.
+    /// Whether the source is live, unlike pictures in files and folders, which are never lost.
     pub fn is_live(&self) -> bool {
         !matches!(self, Self::Folder { .. } | Self::File { .. })
     }

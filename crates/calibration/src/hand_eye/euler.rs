@@ -105,8 +105,8 @@ impl Recomposition {
     }
 
     /// The intended rotations. Each picture has two candidates; `first` (0 or 1) is the candidate of the first picture.
-    /// For each further picture, the candidate is taken whose rotation since the two previous pictures agrees better
-    /// with the board's. `turns` returns the board's rotation between two pictures.
+    /// For each further picture, the rotations of both candidates since the two previous pictures are compared with the
+    /// board's, and the better candidate is taken. `turns` returns the board's rotation between two pictures.
     pub(super) fn apply(
         &self,
         rotations: &[UnitQuaternion<f64>],
