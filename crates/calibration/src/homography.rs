@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Point2, Vector3};
 
 /// The homography from points of a plane to pixels, by least squares of the normalised linear equations. `None` if the
-/// points do not determine it, such as fewer than four, or points on a line.
+/// points do not determine the homography, for example if there are fewer than four, or if all are on a line.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, algorithm 4.2.

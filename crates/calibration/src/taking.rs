@@ -1,5 +1,5 @@
-//! Selects frames of a camera for the calibration: the board is at rest in them, and its view differs from all previous
-//! ones.
+//! Selects frames of a camera for the calibration: frames in which the board is at rest, in a view that differs from
+//! all previous views.
 
 use nalgebra::Vector2;
 use sdg_geometry::median;

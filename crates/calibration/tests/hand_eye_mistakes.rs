@@ -6,7 +6,7 @@ use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, calibrate_h
 use sdg_geometry::Mount;
 
 const MOUNTS: [Mount; 2] = [Mount::Hand, Mount::Base];
-/// Largest relative error of the estimated scale with [`NOISY_ROBOT`]; its standard error is 0.001.
+/// Largest relative error of the estimated scale with [`NOISY_ROBOT`]; the scale's standard error is 0.001.
 const MAX_SCALE_ERROR: f64 = 0.004;
 
 fn changed(views: &[HandEyeView], change: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>) -> Vec<HandEyeView> {

@@ -15,8 +15,8 @@ const MAX_ERRORS: usize = 16;
 
 /// The newest frame of a camera that a thread reads; older frames are dropped and counted.
 ///
-/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. When dropped, it
-/// waits until the thread has finished its current frame and the camera is closed.
+/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. Dropping it waits
+/// until the thread has finished the current frame and the camera is closed.
 pub struct LatestFrame {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,

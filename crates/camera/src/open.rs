@@ -24,7 +24,7 @@ const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis
 /// faults.
 ///
 /// # Errors
-/// [`CameraError::Open`] and [`CameraError::Setting`] if it cannot be opened or rejects its settings,
+/// [`CameraError::Open`] and [`CameraError::Setting`] if the camera cannot be opened or rejects its settings,
 /// [`CameraError::OpenedElsewhere`] for [`Address::Sim`] and [`Address::Ros2`].
 pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>, CameraError> {
     let name: Arc<str> = address.to_string().into();

@@ -13,7 +13,7 @@ use crate::inputs;
 
 const KEYWORD: &str = "Software";
 const TEXT: &str = "sdg drawing";
-/// Maximum end of the text, which precedes the pixels and follows 33 bytes of signature and size.
+/// Maximum position of the end of the text. The text precedes the pixels and follows 33 bytes of signature and size.
 const MAX_TEXT_END: u64 = 100;
 
 /// Writes a picture as PNG, atomically, never over an input or a file of another kind.

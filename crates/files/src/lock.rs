@@ -15,8 +15,8 @@ pub enum Access {
     Shared,
 }
 
-/// The lock of a file, held until it is dropped. A file system without locks grants it to every process, so a single
-/// process can always work.
+/// The lock of a file, held until it is dropped. A file system without locks grants the lock to every process, so a
+/// single process can always work.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 

@@ -18,8 +18,8 @@ pub type Origin = BTreeMap<String, String>;
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and how
-/// they were made; `None` if the file is of another kind, or the taught model has no network.
+/// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and the
+/// [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has no network.
 ///
 /// # Errors
 /// The file cannot be read, the weights are of another preset, or a named part does not exist.

@@ -95,7 +95,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let mut palette = None;
     let bytes = match format {
         ImageFormat::Jpeg => {
-            // Checked before the checks of the data, which decode the picture.
+            // The size is checked first, because the checks of the data decode the picture.
             let header = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
             if let Ok((width, height)) = header {
                 check_size(width, height, limits)?;

@@ -55,7 +55,7 @@ pub fn to_bytes(message: &impl Cdr) -> Vec<u8> {
     writer.bytes
 }
 
-/// Reads a little-endian message without the four bytes that name the encoding; bytes after it are ignored.
+/// Reads a little-endian message without the four bytes that name the encoding; bytes after the message are ignored.
 ///
 /// # Errors
 /// [`CdrError`] for bytes that are not such a message.

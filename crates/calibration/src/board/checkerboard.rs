@@ -169,7 +169,8 @@ mod tests {
         assert!(!board.is_inked(&Point2::new(-0.01, 0.01)) && !board.is_inked(&Point2::new(9.01, 5.9)));
         assert_eq!(board.corner([8, 5]), Point3::new(0.2, 0.125, 0.0));
         assert_eq!(board.corners().count(), board.num_corners());
-        // A dot has the opposite colour of its square: the ink differs between its centre and the square around it.
+        // A dot has the opposite colour of its square: the ink differs between the dot's centre and the square around
+        // the dot.
         let (column, row) = (0..54).map(|k| (k % 9, k / 9)).find(|(x, y)| Board::has_dot(*x, *y)).unwrap();
         let [x, y] = [column, row].map(|k| f64::from(k) + 0.5);
         assert_ne!(board.is_inked(&Point2::new(x, y)), board.is_inked(&Point2::new(x + 0.2, y)));

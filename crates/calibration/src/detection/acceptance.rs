@@ -46,7 +46,7 @@ fn off(corners: &[SeenCorner]) -> Option<f64> {
     Some((squares.sum::<f64>() / corners.len() as f64).sqrt())
 }
 
-/// Variation of brightness within squares, over its difference between neighbouring squares.
+/// Variation of brightness within squares, divided by the difference of brightness between neighbouring squares.
 fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
     let pixels: BTreeMap<[u32; 2], Point2<f64>> = corners.iter().map(|seen| (seen.corner, seen.pixel)).collect();
     let rings = pixels.keys().filter_map(|&[i, j]| {

@@ -135,8 +135,8 @@ fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     is_clear.then(|| turned.corners(grid, sides))
 }
 
-/// The placement of a board without dots, which must be completely visible. The colours of the squares distinguish the
-/// board from the same board rotated by 180 degrees if one side has an odd and the other an even number of squares;
+/// The placement of a board without dots. The board must be completely visible. The colours of its squares distinguish
+/// it from the same board rotated by 180 degrees if one side has an odd and the other an even number of squares;
 /// otherwise `None`.
 fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     let sides = [board.columns(), board.rows()];

@@ -1,7 +1,7 @@
 //! Grows a grid from one saddle point, neighbour by neighbour.
 //!
 //! Legend: a grid's positions `[i, j]` count from the first saddle point, and may be negative. The axes `i` and `j`
-//! have the same orientation as the board's x and y seen from its printed side: `j` is to the left of `i` (y of pixels
+//! have the same orientation as the board's x and y seen from the printed side: `j` is to the left of `i` (y of pixels
 //! points down).
 
 use std::collections::{BTreeMap, VecDeque};

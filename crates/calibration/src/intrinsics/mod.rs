@@ -68,7 +68,7 @@ impl Calibration {
 /// The result for one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureFit {
-    /// RMS error of the corners; for an excluded picture, with the camera estimated without it.
+    /// RMS error of the corners; for an excluded picture, with the camera estimated from the others.
     pub rms_px: f64,
     /// Pose of the board in the camera's frame.
     pub camera_from_board: Isometry3<f64>,

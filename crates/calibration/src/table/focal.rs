@@ -91,9 +91,9 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show it.
+    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point.
     pub at_sheet_m: f64,
-    /// Largest error along the picture's border, in metres, where it shows the plane at that height.
+    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height.
     pub at_border_m: f64,
 }
 

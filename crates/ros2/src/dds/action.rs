@@ -179,7 +179,7 @@ where
         Ok(status)
     }
 
-    /// Asks the server to cancel a goal; returns whether it accepts.
+    /// Asks the server to cancel a goal; returns whether the server accepts.
     ///
     /// # Errors
     /// No answer in time, and errors reported by the network.

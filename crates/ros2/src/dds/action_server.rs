@@ -53,8 +53,8 @@ where
         Self { name, inner, running: None, ended: Vec::new(), waiting: Vec::new() }
     }
 
-    /// The next request, without waiting; `None` if there is none, or it was refused. `accepts` decides whether a valid
-    /// goal is accepted.
+    /// The next request, without waiting; `None` if there is none, or the request was refused. `accepts` decides
+    /// whether a valid goal is accepted.
     ///
     /// # Errors
     /// Errors reported by the network.

@@ -38,7 +38,8 @@ const MAX_DELAY_SECS: f64 = 5.0;
 const MAX_HAND: Duration = Duration::from_secs(15);
 /// Time without joint states after which the driver counts as disconnected.
 const MAX_STATE_AGE: Duration = Duration::from_millis(500);
-/// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 per second, and networks delay them.
+/// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 states per second, and networks delay
+/// them.
 const MAX_SILENCE_SECS: f64 = 0.5;
 /// Interval of checks while hand or arm moves.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -118,7 +119,7 @@ impl TrajectoryArm {
         })
     }
 
-    /// Passes a new state to `watch` and returns its reason to stop the arm.
+    /// Passes a new state to `watch` and returns the watch's reason to stop the arm.
     fn observe(&self, watch: &mut Watch, seen_secs: &mut f64) -> Result<Option<StopReason>> {
         let state = self.arm_state(ArmMode::Moving)?;
         if state.time_secs == *seen_secs {

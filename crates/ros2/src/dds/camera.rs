@@ -96,7 +96,7 @@ enum Pictures {
 
 /// A camera whose pictures come from a topic.
 pub struct RosCamera {
-    // The node is kept because its topics end with it.
+    // The node is kept because its topics end when it is dropped.
     _node: Node,
     pictures: Pictures,
     name: Arc<str>,

@@ -64,8 +64,8 @@ const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 /// waits for events, of which `ros2-client` keeps eight and drops the rest: if the endpoints of two actions are matched
 /// within a millisecond, the last event may be dropped.
 const MATCH_AGAIN: Duration = Duration::from_millis(100);
-/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore its messages before the answer; see
-/// action.rs.
+/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore the writer's messages before the
+/// answer; see action.rs.
 const SETTLE: Duration = Duration::from_millis(200);
 
 /// The settings of a node before it joins.
@@ -291,7 +291,7 @@ impl Drop for Node {
     fn drop(&mut self) {
         self.node = None;
         if let Some(spinner) = self.spinner.take() {
-            // After a panic, its thread has already printed a message.
+            // If the spinner's thread panicked, it has already printed a message.
             let _ = spinner.join();
         }
     }
