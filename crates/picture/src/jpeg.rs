@@ -45,7 +45,7 @@ const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 
 impl JpegScanner {
-    /// Continues scanning. `bytes` begin with the start marker, and with the bytes of the previous call.
+    /// Continues scanning. `bytes` begin with the start marker and extend the bytes of the previous call.
     pub fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
         if self.position == 0 {
             match bytes {
