@@ -45,14 +45,14 @@ impl Frame {
     }
 }
 
-/// A camera above a table.
+/// A calibrated camera, above a table or on the robot's hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedCamera {
     /// The name in the file.
     pub name: String,
     /// Size, focal length, lens.
     pub intrinsics: PinholeCamera,
-    /// The camera's pose; `None` if the file has only intrinsics.
+    /// The camera's pose above the table; `None` if the file has no `table:`.
     pub table: Option<TablePose>,
     /// For a camera on the hand: the transform from the optical frame to the robot's flange, in metres.
     pub flange_from_camera: Option<Isometry3<f64>>,
@@ -163,8 +163,8 @@ impl CalibratedCamera {
     /// Reads a camera file.
     ///
     /// # Errors
-    /// The file is not a `camera_info` with a `plumb_bob` lens, or has a pose that is impossible for a camera above a
-    /// table.
+    /// The file is not a `camera_info` with a `plumb_bob` lens, the lens folds the picture, or a pose or the workspace
+    /// is impossible.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
             // Only the first line: the further ones repeat the position in the file.
@@ -185,7 +185,7 @@ impl CalibratedCamera {
         self.sections().into_iter().map(|(_, section)| section).collect()
     }
 
-    /// Returns an existing file with this camera's values. Data of other programs and comments are kept.
+    /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept.
     ///
     /// # Errors
     /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.
@@ -240,10 +240,10 @@ impl CalibratedCamera {
         SECTIONS.into_iter().zip(texts).filter_map(|(name, text)| Some((name, text?))).collect()
     }
 
-    /// The camera in the table's frame, and the table's pose.
+    /// The camera with its pose in the frame [`TablePose::frame`], and that [`TablePose`].
     ///
     /// # Errors
-    /// [`CameraFileError::NoPose`] if the file has none.
+    /// [`CameraFileError::NoPose`] if the file has no `table:`.
     pub fn posed(&self) -> Result<(PosedCamera, &TablePose), CameraFileError> {
         let table = self.table.as_ref().ok_or(CameraFileError::NoPose)?;
         Ok((PosedCamera { intrinsics: self.intrinsics, world_from_camera: table.frame_from_camera }, table))
@@ -262,9 +262,9 @@ impl CalibratedCamera {
     }
 }
 
-/// Values that are accepted in lines other than `distortion_model`.
+/// Accepted values of the fields `camera_model`, `lens_model` and `projection_model`.
 const PINHOLE_NAMES: [&str; 6] = ["pinhole", "perspective", "plumb_bob", "radtan", "brown", "opencv"];
-/// Number of points along each side of the picture at which the lens is checked.
+/// Number of intervals along each side of the picture between the points at which the lens is checked.
 const TRIED_A_SIDE: u32 = 16;
 
 /// Rejects a file in which another field than `distortion_model` names a camera that is not a pinhole.
@@ -287,7 +287,7 @@ fn check_model(file: &File) -> Result<(), CameraFileError> {
     }
 }
 
-/// Rejects a lens that shows one point at two pixels of the picture, or no point at a pixel.
+/// Rejects a lens that shows one point at two pixels of the picture, or no point at a pixel. Checked at the border.
 fn check_does_not_fold(camera: &PinholeCamera) -> Result<(), CameraFileError> {
     let [width, height] = [camera.width, camera.height].map(f64::from);
     let border = (0..=TRIED_A_SIDE).map(|step| f64::from(step) / f64::from(TRIED_A_SIDE)).flat_map(|share| {

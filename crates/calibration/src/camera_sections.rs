@@ -1,10 +1,10 @@
 //! Updates a camera file and keeps the rest of it: comments, and fields of other programs.
 //!
-//! A section is a line that starts with its name, and the indented lines after it. All tools write `camera_info` in
-//! this form.
+//! A section is a line that starts with the section's name, and the indented lines after this line. All tools write
+//! `camera_info` in this form.
 
 /// Replaces each of the `known` sections of `existing` by the section of the same name in `sections`, or removes it if
-/// there is none. Missing sections are added at the end.
+/// `sections` has none. Missing sections are added at the end.
 pub(crate) fn merged(existing: &str, known: &[&str], sections: &[(&str, String)]) -> String {
     let mut text = String::new();
     let mut written: Vec<&str> = Vec::new();

@@ -8,7 +8,7 @@ pub enum CameraFileError {
     /// The file is not YAML, or does not have ROS's names.
     #[error("expected a camera file as ROS's camera_calibration writes it, found: {found}")]
     Unreadable { found: String },
-    /// The lens model is not `plumb_bob`.
+    /// The lens model is not `plumb_bob`, or the number of coefficients is not 4 or 5.
     #[error(
         "expected distortion_model plumb_bob with 4 or 5 coefficients, found {found} with {coefficients}; calibrate again with that \
          model (in OpenCV: without CALIB_RATIONAL_MODEL and not as fisheye)"
@@ -44,10 +44,10 @@ pub enum CameraFileError {
         width: u32,
         height: u32,
     },
-    /// The pose is not a rigid transform.
+    /// A pose is not a rigid transform, or a pose or the workspace is too far away.
     #[error("expected {name} to be {expected}, found {found:?}")]
     Pose { name: String, expected: &'static str, found: Vec<f64> },
-    /// The file has only intrinsics.
+    /// The file has no pose above the table.
     #[error("expected the camera's pose above the table (`table:`), found none; `sdg camera table` measures it")]
     NoPose,
     /// The camera's height is impossible.
@@ -112,7 +112,7 @@ pub enum CalibrationError {
         /// Number of corners along the largest grid's second axis.
         rows: usize,
     },
-    /// The placement of the grid on the board is unknown.
+    /// The placement of the grid on the board is unknown, or the grid's corners are not those of a board.
     #[error(
         "expected enough of the board to identify the visible squares, found {corners} corners and no position on the \
          board that matches its dots: show more of it, or print it with `sdg camera board`; a checkerboard without \
@@ -160,7 +160,7 @@ pub enum CalibrationError {
     /// No pose explains the corners.
     #[error("expected corners of a flat board in a pinhole camera's picture, found corners that no pose explains")]
     NoPose,
-    /// The camera is below the sheet, or near its horizon.
+    /// The camera is below the sheet, or tilted so far that the sheet's horizon is near.
     #[error(
         "expected a camera that looks down at the sheet, found it tilted by {tilt_deg:.1} degrees from the vertical: \
          beyond {max_deg} degrees the table's \
@@ -220,8 +220,8 @@ pub enum CalibrationError {
         /// The given side of a square, in metres.
         told_m: f64,
         /// The estimated size as a multiple of the given one.
-        /// Standard error of `scale`.
         scale: f64,
+        /// Standard error of `scale`.
         sigma: f64,
         left_px: f64,
     },

@@ -9,7 +9,7 @@ use crate::table::{focal_from_sheet, homography_rms_px};
 
 /// Largest relative error of a focal length from the sheet's perspective.
 const MAX_FOCAL_SIGMA: f64 = 0.1;
-/// Assumed horizontal angle of view, in degrees: typical of webcams and phones.
+/// Assumed angle of view along the picture's longer side, in degrees: typical of webcams and phones.
 pub const ASSUMED_VIEW_DEG: f64 = 60.0;
 /// Largest reprojection error that a lens without distortion explains; a larger one is due to distortion.
 const MAX_STRAIGHT_PX: f64 = 1.0;

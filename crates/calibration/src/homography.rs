@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Point2, Vector3};
 
 /// The homography from points of a plane to pixels, by least squares of the normalised linear equations. `None` if the
-/// points do not determine it: fewer than four, or all on a line.
+/// points do not determine the homography, for example if there are fewer than four, or if all are on a line.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, algorithm 4.2.
@@ -28,7 +28,7 @@ pub(crate) fn fit(places: &[(Point2<f64>, Point2<f64>)]) -> Option<Matrix3<f64>>
     let eigen = normal.symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // A second undetermined direction: the points lie on a line.
+    // A second undetermined direction, as for points on a line.
     if eigen.eigenvalues[order[1]] < 1e-9 * eigen.eigenvalues[order[8]] {
         return None;
     }

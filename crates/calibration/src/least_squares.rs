@@ -80,7 +80,8 @@ const MIN_DECREASE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-3;
 const MAX_DAMPING: f64 = 1e12;
 
-/// Minimises from the problem's current parameters; `None` if these are impossible.
+/// Minimises from the problem's current parameters; `None` if these are impossible, or a picture's own parameters are
+/// undetermined.
 pub(crate) fn minimise<P: Problem<S>, const S: usize>(start: P) -> Option<Minimum<P, S>> {
     let cost_of = |blocks: &[Block<S>]| blocks.iter().map(|block| block.cost).sum::<f64>();
     let mut at = start;
@@ -110,7 +111,7 @@ pub(crate) fn minimise<P: Problem<S>, const S: usize>(start: P) -> Option<Minimu
     cost.is_finite().then_some(Minimum { at, cost, information })
 }
 
-/// The equations of the shared parameters, without those of the pictures.
+/// The equations of the shared parameters, after elimination of the pictures' own parameters.
 fn reduced<const S: usize>(
     blocks: &[Block<S>],
     fixed: &[bool; S],
@@ -183,7 +184,7 @@ mod tests {
                     by_own[0] = 1.0;
                     block.add(&residual, &SMatrix::<f64, 1, 2>::new(1.0, *x), &by_own, 1.0);
                 }
-                // The prior; and a small value for parameters without influence.
+                // The prior; and a value for the parameters without influence, so that the matrix has an inverse.
                 block.own += Matrix6::identity();
                 block.own_gradient[0] += own;
                 block.cost += own * own;

@@ -9,10 +9,11 @@
 //! CalibratedCamera: ROS's camera_info YAML, with `table:` and `hand_eye:` ─ PosedCamera, workspace ─ plan view
 //! ```
 //! **Frames.** ROS and OpenCV place the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is
-//! added when such a file is read and subtracted when it is written. The board's origin is the outer corner of its
-//! lower left dark square, x right, y up, z out of the sheet. Lengths are in metres; `z` points up from the table.
+//! added when a camera file is read and subtracted when the file is written. The board's origin is the outer corner of
+//! its lower left dark square, x right, y up, z out of the sheet. Lengths are in metres; `z` points up from the table.
 //!
-//! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Files and clocks are in `cli`.
+//! **Not supported**: fisheye lenses, several cameras at once, rolling shutters. Not in this crate: access to files
+//! (crates `inputs` and `cli`) and clocks.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Vector3};

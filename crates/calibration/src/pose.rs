@@ -35,7 +35,7 @@ pub fn board_pose(camera: &PinholeCamera, board: &Board, corners: &[SeenCorner])
     Some(BoardPose { camera_from_board: minimum.at.camera_from_board, rms_px, covariance })
 }
 
-/// The pose from a homography to points at depth 1, which determines the first two axes and the translation.
+/// The pose from a homography to points at depth 1. The homography determines the first two axes and the translation.
 pub(crate) fn from_homography(homography: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let [x, y, t] = [0, 1, 2].map(|k| homography.column(k).into_owned());
     let scale = 2.0 / (x.norm() + y.norm());

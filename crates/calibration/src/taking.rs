@@ -1,5 +1,5 @@
-//! Selects frames of a camera for the calibration: the board is at rest in them, and its view differs from all previous
-//! ones.
+//! Selects frames of a camera for the calibration: frames in which the board is at rest, in a view that differs from
+//! all previous views.
 
 use nalgebra::Vector2;
 use sdg_geometry::median;
@@ -11,8 +11,8 @@ use crate::detection::SeenCorner;
 const STILL_SHARE: f64 = 0.002;
 /// Number of successive frames at rest that are required, so that no picture is blurred.
 const STILL_FRAMES: u32 = 4;
-/// Minimum distance of the corners from those of every other view for a new view, as a fraction of the diagonal. Chosen
-/// by hand: 48 pixels of 640 × 480, a tenth of the board's width if it fills the picture.
+/// A view is new if its corners are at least this far from those of every other view, as a fraction of the diagonal.
+/// Chosen by hand: 48 pixels of 640 × 480, a tenth of the board's width if it fills the picture.
 const NEW_PLACE_SHARE: f64 = 0.06;
 /// Like [`NEW_PLACE_SHARE`], for the corners relative to their centre: another tilt or size at the same place. Chosen
 /// by hand: 10 pixels of 640 × 480, the effect of a tilt by 25 degrees on a board that fills half of the picture.
@@ -21,7 +21,7 @@ const NEW_SHAPE_SHARE: f64 = 0.0125;
 /// The state of the board in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// The board moves.
+    /// The board moves, or has not been at rest for enough frames.
     Moving,
     /// At rest, in a view that was taken already.
     Known,
@@ -78,7 +78,7 @@ impl PictureTaker {
         if self.taken.iter().any(is_known) { Sight::Known } else { Sight::New }
     }
 
-    /// Processes a next frame without the board.
+    /// Processes the next frame, which does not show the board.
     pub fn lose(&mut self) {
         self.still = None;
     }

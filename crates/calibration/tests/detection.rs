@@ -133,7 +133,7 @@ fn what_is_no_board_is_told_by_what_is_missing() {
     assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
 }
 
-/// Too little of the board is visible; parts of a grid may be found.
+/// Whether the error states that too little of the board is visible; parts of a grid may have been found.
 fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
     use CalibrationError::{BoardNotFound, BoardUnclear, OtherCheckerboard};
     matches!(found, Err(BoardNotFound { .. } | BoardUnclear { .. } | OtherCheckerboard { .. }))
@@ -186,7 +186,7 @@ fn a_board_among_other_squares_and_partly_covered_is_found() {
         println!("clutter {k}: {} corners, {rms:.4} px", corners.len());
         assert!((34..40).contains(&corners.len()) && rms < 0.1, "{k}: {} corners, {rms:.3} px", corners.len());
     }
-    // Without the board, no other pattern is taken for it.
+    // Without the board, no other pattern is taken for the board.
     let floor = |place: &Point2<f64>| {
         let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
         Random(cell(place.x).wrapping_mul(1009).wrapping_add(cell(place.y))).unit() < 0.5

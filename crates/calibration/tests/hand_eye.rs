@@ -160,7 +160,7 @@ fn with_noisy_robot_poses_we_are_nearer_than_every_method_of_opencv() {
             );
             assert!(mm[0] < number("median_mm") && deg[0] < number("median_deg"), "{name}: {method} is nearer");
         }
-        // The sums of squares of the estimated and the true errors are similar.
+        // The root sums of squares of the estimated and the true errors are similar.
         let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
         let told = 1000.0 * squares(&mut found.iter().map(|found| found.sigma_m));
         let ratio = squares(&mut all.iter().map(|errors| errors[0])) / told;
@@ -221,7 +221,7 @@ fn a_pose_that_is_wrong_shows_in_its_picture_and_in_the_spread() {
     let found = solve(Mount::Hand, &views).unwrap();
     let most = |of: &dyn Fn(usize) -> f64| (0..NUM_POSES).max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap();
     assert_eq!(most(&|k| found.pictures_rms_px[k]), 6);
-    // The error is attributed to the robot in all pictures. The spread shows that the result depends on few of them.
+    // The error is attributed to the robot in all pictures. The spread shows that the result depends on few pictures.
     let widest = |found: &HandEye| found.spread.iter().map(|[metres, _]| *metres).fold(0.0, f64::max);
     println!("spread {:.3} mm, before {:.3} mm", 1000.0 * widest(&found), 1000.0 * widest(&good));
     assert!(widest(&found) > 3.0 * widest(&good) && found.robot_sigma.is_some());
@@ -232,7 +232,7 @@ fn poses_that_turn_about_one_axis_are_an_error_that_names_the_others() {
     let mut random = Random(3);
     let exact = Noise { corner_px: 0.1, robot_m: 0.0, robot_deg: 0.0 };
     let first = view(Mount::Hand, &mut random, &exact, 0.0);
-    // Without tilts, only rotations about the optical axis remain, which is nearly the flange's z.
+    // Without tilts, only rotations about the optical axis remain; this axis is nearly the flange's z.
     let mut alike = vec![first.clone()];
     alike.extend((0..8).map(|_| view(Mount::Hand, &mut random, &exact, 0.0)));
     let error = solve(Mount::Hand, &alike).unwrap_err();

@@ -6,7 +6,7 @@ use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, calibrate_h
 use sdg_geometry::Mount;
 
 const MOUNTS: [Mount; 2] = [Mount::Hand, Mount::Base];
-/// Largest relative error of the estimated scale with [`NOISY_ROBOT`]; its standard error is 0.001.
+/// Largest relative error of the estimated scale with [`NOISY_ROBOT`]; the scale's standard error is 0.001.
 const MAX_SCALE_ERROR: f64 = 0.004;
 
 fn changed(views: &[HandEyeView], change: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>) -> Vec<HandEyeView> {
@@ -81,7 +81,7 @@ fn a_board_of_the_told_size_is_not_blamed_where_pictures_are_few() {
         let views = views(Mount::Hand, 7000 + seed, &turned_only);
         assert!(solve(Mount::Hand, &views[..6]).is_ok(), "{seed}");
     }
-    // A third of a percent is the reading error of a ruler.
+    // A difference of up to 0.3 percent is the reading error of a ruler.
     assert!(solve_told(Mount::Hand, &views(Mount::Hand, 3, &EXACT_ROBOT), 1.002).is_ok());
 }
 

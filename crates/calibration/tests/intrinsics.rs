@@ -164,7 +164,7 @@ fn a_bad_picture_is_named_and_left_out() {
     assert_eq!(left_out, [4]);
     assert!(found.rms_px < 0.1 && found.pictures[4].rms_px > 0.5, "{}", found.rms_px);
     assert!((found.camera.fx / camera.fx - 1.0).abs() < MAX_FOCAL_ERROR);
-    // One corner is replaced by another.
+    // One corner is shifted by 1.2 pixels.
     let mut views = synthetic(&camera, 0.05, 3);
     views[2][7].pixel += nalgebra::Vector2::new(1.2, 0.0);
     let found = calibrate(&board(), &views, &config(&camera)).unwrap();

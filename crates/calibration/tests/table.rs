@@ -8,7 +8,7 @@ use sdg_calibration::{
 };
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-/// Largest error of the camera's position: a twentieth of a pixel at 0.6 m, tilted.
+/// Largest error of the camera's position: the effect of corner errors of a twentieth of a pixel at 0.6 m, tilted.
 const MAX_PLACE_ERROR_M: f64 = 0.0005;
 
 fn board() -> Board {

@@ -60,7 +60,7 @@ pub enum NodeName {
     Any,
     /// The node with this path.
     Path(PathBuf),
-    /// The first node whose card name contains this text, ignoring case.
+    /// The first node with a supported format whose card name contains this text, ignoring case.
     Card(String),
 }
 
@@ -76,7 +76,7 @@ pub struct Playback {
 }
 
 impl Address {
-    /// Whether the source is live, so that unread frames are lost. Pictures in files and folders are never lost.
+    /// Whether the source is live, unlike pictures in files and folders, which are never lost.
     pub fn is_live(&self) -> bool {
         !matches!(self, Self::Folder { .. } | Self::File { .. })
     }

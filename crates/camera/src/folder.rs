@@ -154,7 +154,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     Ok(names)
 }
 
-/// Reads a picture and its modification time. While the picture cannot be decoded and the file grows, it is read again.
+/// Reads a picture and its modification time. A file that cannot be decoded is read again while it may still grow.
 fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, SystemTime), String> {
     let mut unchanged: Option<(u64, Instant)> = None;
     loop {

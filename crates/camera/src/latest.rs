@@ -15,8 +15,8 @@ const MAX_ERRORS: usize = 16;
 
 /// The newest frame of a camera that a thread reads; older frames are dropped and counted.
 ///
-/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. When dropped, it
-/// waits until the thread has finished its current frame and the camera is closed.
+/// It is a [`Camera`] itself: [`next_frame`](Camera::next_frame) returns each frame at most once. Dropping it waits
+/// until the thread has finished the current frame and the camera is closed.
 pub struct LatestFrame {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -107,7 +107,7 @@ impl LatestFrame {
         }
     }
 
-    /// Whether there are no more frames and all frames were taken.
+    /// Whether the camera has ended, and all frames and errors were taken.
     pub fn has_ended(&self) -> bool {
         let newest = self.shared.lock();
         newest.has_ended && newest.frame.is_none() && newest.errors.is_empty()
@@ -155,7 +155,7 @@ mod tests {
     use image::RgbImage;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// Delivers a frame for each number that is sent, and a torn one for `None`; sends a message before each.
+    /// Delivers a frame for each number that is received, and a fault for `None`; sends a message before each.
     pub(super) struct Driven(pub(super) Receiver<Option<u64>>, pub(super) Sender<()>);
 
     impl Camera for Driven {

@@ -17,14 +17,14 @@ use crate::watched::Watched;
 
 /// Range of requested frame rates, in frames per second.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
-/// Range of stall timeouts: longer than the time of a frame, at most an hour.
+/// Range of stall timeouts.
 const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
 
 /// Opens the camera at an address. The camera is reopened if its connection is lost, and its frames are checked for
 /// faults.
 ///
 /// # Errors
-/// [`CameraError::Open`] and [`CameraError::Setting`] if it cannot be opened or rejects its settings,
+/// [`CameraError::Open`] and [`CameraError::Setting`] if the camera cannot be opened or rejects its settings,
 /// [`CameraError::OpenedElsewhere`] for [`Address::Sim`] and [`Address::Ros2`].
 pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>, CameraError> {
     let name: Arc<str> = address.to_string().into();

@@ -16,7 +16,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// All encodings, in order of preference: lossless first.
+    /// All encodings, in order of preference: the one with the smallest loss first.
     pub const ALL: [Self; 3] = [Self::Rgb24, Self::Yuyv, Self::Mjpeg];
 
     /// V4L2's four-character code.

@@ -110,7 +110,7 @@ impl Source for Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // Dropping the receiver ends the reading thread if it waits for its picture to be taken.
+        // Dropping the receiver ends the reading thread if the thread waits until its picture is taken.
         self.pictures = None;
         // The program may have exited already. Without `wait`, it would remain a zombie.
         let _ = self.child.kill();

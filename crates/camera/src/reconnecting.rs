@@ -14,12 +14,12 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Maximum pause: a camera that was plugged in again is reopened within this time.
 const MAX_PAUSE: Duration = Duration::from_secs(5);
 /// Number of stall timeouts in a row after which the connection is dropped: the other end may have disappeared without
-/// closing it.
+/// closing the connection.
 const MAX_STALLS: u32 = 3;
 /// Number of torn frames in a row after which the connection is dropped: the frame boundaries may be lost.
 const MAX_TORN: u32 = 30;
 
-/// Opens a connection; the deadline applies if the operating system supports one.
+/// Opens a connection; the deadline applies only to HTTP.
 pub(crate) type Opener = Box<dyn FnMut(Instant) -> Result<Box<dyn Source>, CameraError> + Send>;
 
 /// A camera that is reopened; frames are numbered across its connections.
@@ -76,7 +76,7 @@ impl Reconnecting {
         fault(&self.name, Fault::Gone { why })
     }
 
-    /// Tries to reopen if it is time, at most until the deadline.
+    /// Waits for the end of the pause and reopens the camera; fails if the pause ends after the deadline.
     fn reopen(&mut self, deadline: Instant) -> Result<(), CameraError> {
         let (retry_at, why) = match &self.lost {
             Some(lost) => (lost.retry_at, lost.why.clone()),

@@ -16,7 +16,7 @@ use crate::error::CameraError;
 const QUALITY: u8 = 90;
 /// Time limit for a browser to read data before it is disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Time limit for receiving a request.
+/// Time limit for each read of a request.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval between checks whether the server ends, while there are no new pictures.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
@@ -41,8 +41,8 @@ const SCRIPT: &str = include_str!("page/page.js");
 /// | `/words` | the description of the newest picture; empty before the first |
 ///
 /// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser
-/// gets the newest picture when it is ready. Only requests to 127.0.0.1 or localhost with this port are answered, and
-/// none from other pages: neither other pages nor foreign host names that resolve to this address get the pictures.
+/// gets the newest picture when the browser is ready. Only requests to 127.0.0.1 or localhost with this port are
+/// answered, and no requests from other pages. Foreign host names that resolve to this address are therefore rejected.
 pub struct MjpegServer {
     shared: Arc<Shared>,
     port: u16,

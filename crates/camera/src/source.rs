@@ -26,7 +26,7 @@ impl Taken {
 /// The reason why a connection gave no picture.
 #[derive(Debug)]
 pub(crate) enum Missing {
-    /// No data until the deadline; the connection is still open.
+    /// No complete picture until the deadline; the connection is still open.
     Late,
     /// This picture is lost; the connection is still open.
     Torn(String),

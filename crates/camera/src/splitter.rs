@@ -4,7 +4,7 @@ use sdg_picture::{JpegEnd, JpegScanner, PpmHead};
 
 use crate::decode::{MAX_ENCODED_BYTES, PNG_START};
 
-/// Number of bytes outside pictures after which they are reported at the latest.
+/// Number of bytes outside pictures from which on they are reported, even if no picture follows.
 const MAX_GARBAGE_BYTES: usize = 1 << 20;
 
 /// The start marker, and the first byte of the next marker.
@@ -49,7 +49,7 @@ impl Splitter {
                         return self.take_garbage().map(Err);
                     }
                 }
-                // Where the garbage ends is unknown before the next bytes.
+                // The next bytes show whether the garbage has ended.
                 Extent::NotYet if self.buffer.len() < PNG_START.len() => return None,
                 _ if self.garbage_bytes > 0 => return self.take_garbage().map(Err),
                 Extent::NotYet => return None,
@@ -67,7 +67,7 @@ impl Splitter {
         }
     }
 
-    /// A description of the incomplete picture at the end of the stream, if any.
+    /// A description of the incomplete picture or the garbage at the end of the stream, if any.
     pub(crate) fn rest(&mut self) -> Option<String> {
         match self.buffer.len() {
             0 => self.take_garbage(),

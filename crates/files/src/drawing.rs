@@ -13,13 +13,13 @@ use crate::inputs;
 
 const KEYWORD: &str = "Software";
 const TEXT: &str = "sdg drawing";
-/// Maximum end of the text, which precedes the pixels and follows 33 bytes of signature and size.
+/// Maximum position of the end of the text. The text precedes the pixels and follows 33 bytes of signature and size.
 const MAX_TEXT_END: u64 = 100;
 
 /// Writes a picture as PNG, atomically, never over an input or a file of another kind.
 ///
 /// # Errors
-/// The errors of [`crate::write`].
+/// [`FileError::Picture`], and the errors of [`crate::write`].
 pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let encoded = picture.write_to(&mut bytes, image::ImageFormat::Png);
@@ -30,7 +30,7 @@ pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
 /// Writes a drawing atomically.
 ///
 /// # Errors
-/// The path is an input, or a picture that is not a drawing of this program; or the system does not allow it.
+/// The path is an input, or a file that is not a drawing of this program; or the system does not allow it.
 pub fn write_drawing(path: &Path, drawing: &RgbImage) -> Result<()> {
     check_replaces_a_drawing(path)?;
     let bytes = encode(drawing).map_err(|source| FileError::Png { path: path.to_owned(), source })?;
@@ -52,7 +52,7 @@ fn encode(drawing: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
 /// Checks that a drawing replaces only an earlier drawing, an empty file or nothing.
 ///
 /// # Errors
-/// Another file.
+/// The path leads to another file.
 fn check_replaces_a_drawing(path: &Path) -> Result<()> {
     let Ok(file) = File::open(path) else { return Ok(()) };
     let mut start = Vec::new();

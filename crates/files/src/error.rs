@@ -47,7 +47,7 @@ pub enum FileError {
         /// The kind of the existing file.
         found: String,
     },
-    /// The path of a drawing is another picture.
+    /// The path of a drawing leads to a file that is not a drawing.
     #[error("{}: expected a new name, or an earlier drawing to replace, found another file", path.display())]
     NoDrawing { path: PathBuf },
     /// A drawing that could not be encoded.
@@ -64,7 +64,7 @@ pub enum FileError {
         step: &'static str,
         source: std::io::Error,
     },
-    /// The path names no file: it ends in `..`, is empty, or is a folder.
+    /// The path names no file: it ends in `..`, is empty, or is a folder, a device or a pipe.
     #[error("cannot write {}: expected the path of a file, found {found}", path.display())]
     NotAFile {
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// For `map_err`: wraps the system's error at a step with a file.
+    /// Returns a function for `map_err` that adds the path and the step to the system's error.
     pub(crate) fn at(path: &std::path::Path, step: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::System { path, step, source }

@@ -26,7 +26,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     Ok((file, metadata.len()))
 }
 
-/// Whether a file can be opened.
+/// Checks that a file can be opened, and registers it as an input.
 ///
 /// # Errors
 /// The file cannot be opened (its name and the system's error), or is a folder.
@@ -59,7 +59,7 @@ pub fn check_are_no_inputs(paths: impl IntoIterator<Item = PathBuf>) -> Result<(
     paths.into_iter().try_for_each(|path| check_is_no_input(&path, None))
 }
 
-/// Registers a file, or the files of a folder, read by code outside this crate, so that [`write`] does not replace it.
+/// Registers a file, or a folder and its files, read by code outside this crate: [`write`] does not replace them.
 pub fn keep(path: &Path) {
     let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let kept = entries.chain([path.to_owned()]).filter_map(|path| path.canonicalize().ok());

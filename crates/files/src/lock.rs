@@ -15,13 +15,14 @@ pub enum Access {
     Shared,
 }
 
-/// The lock of a file, held until it is dropped. A file system without locks grants it to every process, so a single
-/// process can always work.
+/// The lock of a file, held until it is dropped. A file system without locks grants the lock to every process, so a
+/// single process can always work.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 
 impl Lock {
-    /// Takes the lock of the file at `path`, which is created if missing; `None` if another process holds it.
+    /// Takes the lock of the file at `path`, which is created if missing; `None` if another process
+    /// holds a lock that excludes this access.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -31,7 +32,7 @@ impl Lock {
         Ok(is_taken.then_some(Self(file)))
     }
 
-    /// Whether no process holds the lock of a file; false if there is no such file, or no locks.
+    /// Whether no process holds the exclusive lock of a file; false if there is no such file, or no locks.
     pub fn is_free(path: &Path) -> bool {
         File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
     }

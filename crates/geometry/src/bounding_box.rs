@@ -7,8 +7,8 @@ use crate::GeometryError;
 
 /// An axis-aligned box by two corners, in pixels (x right, y down).
 ///
-/// A box may lie partly or wholly outside an image; only [`clip`](Self::clip) limits it. A box made by
-/// [`new`](Self::new) has a positive area; one made from its fields may not.
+/// A box may lie partly or wholly outside an image; only [`clip`](Self::clip) limits it. Only
+/// [`new`](Self::new) guarantees a positive area.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BoundingBox {
     /// Left edge.

@@ -91,7 +91,8 @@ impl GraspLine {
     }
 
     /// The jaw opening, in pixels, to grasp `part` across the midpoint of the line. The gripper closes symmetrically
-    /// about the midpoint, so the opening is twice the larger distance to the outermost crossings of the outline.
+    /// about the midpoint, along the perpendicular through it. The opening is twice the largest distance from the
+    /// midpoint at which this perpendicular crosses the outline.
     ///
     /// Used for marks without an opening, such as those of other tools, in teaching and on the annotation page.
     pub fn opening_across(&self, part: &Polygon) -> f64 {

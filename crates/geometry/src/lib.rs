@@ -9,7 +9,7 @@
 //!
 //! **Frames.** Pixels: x right, y down, the centre of the first pixel at (0.5, 0.5), so an image of width `w` spans
 //! `[0, w]`. Camera: the optical frame, x right, y down, z forward. World: the target of `world_from_camera`; in this
-//! project the frame named in the camera file, the robot's base or the table. Angles are in radians.
+//! project the frame named in the camera file (the robot's base or the table). Angles are in radians.
 //!
 //! Not in this crate: pictures (the `image` crate), tensors (burn) and files.
 //!

@@ -53,7 +53,7 @@ impl Mask {
         self.bits.iter().filter(|&&bit| bit).count()
     }
 
-    /// The tight box around the pixels inside, with their full area; `None` for an empty mask.
+    /// The tight box around the unit squares of all pixels inside; `None` for an empty mask.
     pub fn bounds(&self) -> Option<BoundingBox> {
         let mut bounds: Option<BoundingBox> = None;
         for y in 0..self.height {

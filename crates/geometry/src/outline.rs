@@ -35,7 +35,7 @@ pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
 fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
     let (width, height) = (mask.width() as i64, mask.height() as i64);
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width && y < height && mask.get(x as u32, y as u32);
-    // An upper edge has a pixel of the mask below it and none above; each boundary has at least one.
+    // An upper edge has a pixel of the mask below it and none above; each boundary has at least one upper edge.
     let mut seen = vec![false; (width * height) as usize];
     let mut best: Option<(f64, Vec<Point2<f64>>)> = None;
     for y in 0..height {

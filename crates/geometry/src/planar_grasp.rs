@@ -33,8 +33,8 @@ impl PlanarGrasp {
     /// `None` when fewer than two labelled keypoints remain or when they all coincide.
     ///
     /// # Source
-    /// Paper, section IV-C. The original takes the most frequent whole degree and folds it; total least squares with
-    /// `atan2` avoids the errors of both steps.
+    /// Paper, section IV-C. The original takes the most frequent whole degree and shifts it by an amount that depends
+    /// on the angle; total least squares with `atan2` avoids the errors of both steps.
     pub fn from_keypoints(keypoints: &[Keypoint], width: f64) -> Option<Self> {
         let labelled: Vec<(f64, Point2<f64>)> = keypoints
             .iter()

@@ -16,7 +16,7 @@ pub enum RotationalSymmetry {
     /// No rotation except the identity.
     #[default]
     None,
-    /// The multiples of a full rotation divided by this number, which is at least two.
+    /// The multiples of 2π / n, where n is this number, at least two.
     Fold(u32),
     /// All rotations.
     Full,

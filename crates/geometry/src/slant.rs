@@ -18,8 +18,8 @@ pub struct Slant {
 }
 
 impl Slant {
-    /// The position of a level point in the slanted picture; both relative to the picture's centre. `None` behind the
-    /// camera.
+    /// The position in the slanted picture of a point of the level picture; both relative to the picture's centre.
+    /// `None` behind the camera or close to its plane.
     pub fn picture_from_level(&self, level: Vector2<f64>) -> Option<Vector2<f64>> {
         let [away, aside] = self.axes();
         let (sin, cos) = self.tilt_rad.sin_cos();
@@ -27,8 +27,8 @@ impl Slant {
         (depth > MIN_DEPTH).then(|| (level.dot(&away) * cos * away + level.dot(&aside) * aside) / depth)
     }
 
-    /// The level point at a position of the slanted picture; both relative to the picture's centre. `None` at the
-    /// horizon and beyond.
+    /// The point of the level picture at a position of the slanted picture; both relative to the picture's centre.
+    /// `None` near the horizon and beyond it.
     pub fn level_from_picture(&self, seen: Vector2<f64>) -> Option<Vector2<f64>> {
         let [away, aside] = self.axes();
         let (sin, cos) = self.tilt_rad.sin_cos();
@@ -41,7 +41,7 @@ impl Slant {
         Some(along * away + seen.dot(&aside) * depth * aside)
     }
 
-    /// The level point vertically below the camera, relative to the picture's centre.
+    /// The point of the level picture vertically below the camera, relative to the picture's centre.
     pub fn below_camera(&self) -> Point2<f64> {
         Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
     }

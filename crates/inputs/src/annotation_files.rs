@@ -1,4 +1,4 @@
-//! Annotation files on disk. Some formats keep labels in a second file.
+//! Annotation files on disk. Some formats keep a part of the data in a second file.
 
 use std::path::{Path, PathBuf};
 
@@ -56,10 +56,10 @@ impl AnnotationFile {
         })
     }
 
-    /// The marks on a photo, read upright and checked against its pixels. Marks of other objects are reported.
+    /// The marks on a photo, read upright and checked against its pixels. Entries that do not mark a part are printed.
     ///
     /// # Errors
-    /// The errors of [`Self::objects`] and of [`MarkedPhoto::checked`].
+    /// The errors of [`Self::objects`], [`MarkedPhoto::checked`] and [`Annotation::check`].
     pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
         let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
         let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };

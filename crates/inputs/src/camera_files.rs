@@ -1,4 +1,4 @@
-//! Files of calibrated cameras over a table.
+//! Files of calibrated cameras.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use sdg_robot::workcell::Workcell;
 /// Maximum size of a camera file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A camera file.
+/// A camera file with the camera's pose above the table.
 #[derive(Debug, Clone)]
 pub struct CameraFile {
     camera: CalibratedCamera,
@@ -31,10 +31,10 @@ impl CameraFile {
         Ok(read(path)?.0.intrinsics)
     }
 
-    /// Reads a camera file with the camera's pose.
+    /// Reads a camera file with the camera's pose above the table.
     ///
     /// # Errors
-    /// The file cannot be read or has no pose.
+    /// The file cannot be read or has no such pose.
     pub fn read(path: &Path) -> Result<Self> {
         let (camera, _) = read(path)?;
         let (over_table, _) = camera_over_table(&camera).with_context(|| path.display().to_string())?;

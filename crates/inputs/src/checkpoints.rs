@@ -13,7 +13,8 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, naming_of};
 use crate::base_weights::open;
 use crate::detector_config::{architecture_of, preset, preset_for};
 
-/// The detector of a checkpoint: given by a configuration, stated in the file, or derived from the parameters' names.
+/// The detector of a checkpoint: given by a configuration or a preset's name, stated in the file, or derived from the
+/// parameters' names.
 ///
 /// # Errors
 /// The names are unknown or match no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
@@ -60,7 +61,7 @@ pub fn verify_checkpoint(
     golden::verify(&detector, image, &reference).with_context(|| against.display().to_string())
 }
 
-/// Reads the outputs of the original program. Gradients keep the original's names.
+/// Reads the outputs of the original program. The original's names of gradients are converted to this project's.
 fn read_reference(path: &Path) -> Result<StateDict> {
     const GRADIENTS: &str = "gradients.";
     let (mut source, outputs) = open(path)?;

@@ -57,7 +57,7 @@ pub fn kind_of(config: &RcnnConfig) -> RcnnKind {
     }
 }
 
-/// The preset of this name with a second stage of another kind.
+/// The preset of this name with a second stage of this kind.
 ///
 /// # Errors
 /// An unknown name.

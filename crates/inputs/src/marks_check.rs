@@ -27,10 +27,10 @@ pub struct MarkedPhoto<'a> {
 }
 
 impl MarkedPhoto<'_> {
-    /// The marks that `read` returns for the upright photo: one, several, or none if the part is not in it.
+    /// The marks that `read` returns for the upright photo: one, several, or none if the photo does not show the part.
     ///
     /// # Errors
-    /// The errors of `read`; or the marks fit the pixels as stored at least as well.
+    /// The errors of `read`; or the marks do not fit the upright pixels clearly better than the stored pixels.
     pub fn upright<T>(
         &self,
         read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
@@ -69,7 +69,7 @@ impl MarkedPhoto<'_> {
             let as_shown = marked.as_ref().map_or(0.0, |marked| fit(self.image, marked));
             let as_stored = fit(&sensor, &of_sensor);
             let has_marks = !of_sensor.is_empty() || marked.as_ref().is_ok_and(|marked| !marked.is_empty());
-            // Marks that fit neither have another error, which is reported later.
+            // Marks that fit neither orientation have another error, which is reported later.
             if as_stored > 0.0 && as_shown <= MIN_GAIN * as_stored {
                 let as_well = if as_stored > MIN_GAIN * as_shown { "" } else { " just as well" };
                 bail!(
@@ -87,7 +87,8 @@ impl MarkedPhoto<'_> {
     /// Like [`Self::upright`], for a demonstration, in which the part must be clearly visible.
     ///
     /// # Errors
-    /// The errors of [`Self::upright`]; or the marks fit in another reading, or name another existing picture.
+    /// The errors of [`Self::upright`]; or the marks fit in another reading of their numbers; or their file names
+    /// another existing picture.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();
@@ -148,7 +149,7 @@ impl MarkedPhoto<'_> {
             let means = [mean, other_mean];
             pairs.iter().map(|pair| (pair[a] - means[a]) * (pair[b] - means[b])).sum::<f64>()
         };
-        // In a uniform area, both are equal for these marks.
+        // In a uniform area all products are 0, so the pictures count as the same.
         product(0, 1) >= MIN_CORRELATION * (product(0, 0) * product(1, 1)).sqrt()
     }
 }

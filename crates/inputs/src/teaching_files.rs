@@ -24,12 +24,13 @@ pub struct TeachingFiles<'a> {
 
 impl TeachingFiles<'_> {
     /// Reads the demonstrations; with a camera, in the plan view of the marks' plane. Adds the pictures without the
-    /// part and the lengths to the options, and sets the size of pictures for a region in the options to that of the
+    /// part and the lengths to the options. If the options have a region, its picture size is set to the size of the
     /// first photo.
     ///
     /// # Errors
-    /// Files cannot be read; with a camera: a photo is rotated by an Exif orientation, has a different size, or has
-    /// marks that are outside the visible part of the plane; the region is not inside the first photo.
+    /// Files cannot be read, or the region is not inside the first photo. With a camera: a photo is rotated by an Exif
+    /// orientation, has a different size, or has marks outside the visible part of the plane; or the region
+    /// cannot be searched in the plan view.
     pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {
         let mut pixel_frame = PixelFrame::Upright;
         if self.camera.is_some() {

@@ -8,7 +8,8 @@ use sdg_robot::workcell::Workcell;
 /// Maximum size of a workcell file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Reads a workcell file. Returns the workcell, and the path of its camera file relative to the workcell file's folder.
+/// Reads a workcell file. Returns the workcell and the path of its camera file. The workcell file states this path
+/// relative to its own folder.
 ///
 /// # Errors
 /// The file is invalid (with the line), or cannot be read.

@@ -30,8 +30,8 @@ pub enum PixelFrame {
     /// As shown by a viewer: rotated or mirrored by the Exif orientation.
     #[default]
     Upright,
-    /// As delivered by the sensor, to which a calibration refers; phones that look straight down set an arbitrary
-    /// orientation.
+    /// As delivered by the sensor, without the Exif orientation. A calibration refers to these pixels; phones that look
+    /// straight down set an arbitrary orientation.
     Sensor,
 }
 
@@ -74,12 +74,13 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 /// The format is recognised by the content: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF.
 /// Grey and deeper images are converted; 10 and 12 bits stored in 16 are scaled by their own range. Transparent pixels
 /// are composited over white, unless all pixels are (almost) fully transparent, which is how programs leave an unused
-/// alpha channel. Floats of 0 to 255 are read like integers. Of a TIFF, the full-size page is read.
+/// alpha channel. Floats above 2 are read as integers of 8 to 16 bits. Of a TIFF, the full-size page is read.
 ///
 /// # Errors
 /// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
-/// file, zero width or height, more than `limits.max_pixels` (PPM: more than 64 megapixels), a TIFF with several
-/// full-size pages, raw data or a palette that has not 8 bits, or inks with unknown storage.
+/// file, zero width or height, more than `limits.max_pixels` (PPM: more than 64 megapixels, a side above 16384 pixels
+/// or values above 255), a TIFF with several full-size pages, raw data or a palette that has not 8 bits, or a CMYK JPEG
+/// for which it is unknown whether the inks are inverted.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
@@ -94,7 +95,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let mut palette = None;
     let bytes = match format {
         ImageFormat::Jpeg => {
-            // Checked before the checks of the data, which decode the picture.
+            // The size is checked first, because the checks of the data decode the picture.
             let header = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
             if let Ok((width, height)) = header {
                 check_size(width, height, limits)?;
@@ -168,7 +169,7 @@ fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
     Ok(())
 }
 
-/// The kind of an ISO media file. None is supported: HEIC is patented, and there is no small AVIF decoder in Rust.
+/// The kind of an ISO media file. No kind is supported: HEIC is patented, and there is no small AVIF decoder in Rust.
 fn iso_media(bytes: &[u8]) -> Option<&'static str> {
     let brand = bytes.get(8..12).filter(|_| bytes.get(4..8) == Some(b"ftyp"))?;
     match brand {
@@ -224,7 +225,7 @@ mod tests {
         decode_image(bytes, &ImageLimits::default())
     }
 
-    /// A PNG with another size in its header. The checksum is then wrong; the size is rejected before it is read.
+    /// A PNG with another size in its header. The checksum is then wrong, but the size is rejected first.
     fn png_header(width: u32, height: u32) -> Vec<u8> {
         let mut bytes = encode(&gradient(), ImageFormat::Png);
         bytes[16..20].copy_from_slice(&width.to_be_bytes());

@@ -45,7 +45,7 @@ const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
 const PROGRESSIVE: u8 = 0xc2;
 
 impl JpegScanner {
-    /// Continues scanning. `bytes` begin with the start marker, and with the bytes of the previous call.
+    /// Continues scanning. `bytes` begin with the start marker and extend the bytes of the previous call.
     pub fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
         if self.position == 0 {
             match bytes {
@@ -135,7 +135,7 @@ impl JpegScanner {
         }
     }
 
-    /// Whether the scans so far contain the whole picture.
+    /// Whether the scans so far contain all coefficients of a progressive picture; true for other pictures.
     fn is_fully_sent(&self) -> bool {
         !self.is_progressive
             || self.num_components.is_some_and(|count| self.sent.len() == usize::from(count))
@@ -150,8 +150,8 @@ impl JpegScanner {
 /// are complete.
 ///
 /// # Errors
-/// Truncated or invalid data, data without a picture, or inks without Adobe's marker, for which it is unknown whether
-/// they are inverted.
+/// Truncated or invalid data, data without a picture, or CMYK inks without Adobe's marker, for which it is unknown
+/// whether they are inverted.
 pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
     let damaged = |reason: String| PictureError::DamagedImage { format: "JPEG", reason };
     let mut scanner = JpegScanner::default();

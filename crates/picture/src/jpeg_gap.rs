@@ -21,7 +21,7 @@ const PROBES: [u8; 2] = [0x55, 0xaa];
 struct Stretch {
     start: usize,
     end: usize,
-    /// Number of the restart marker after it, from 0 to 7.
+    /// Number of the restart marker after the data, from 0 to 7.
     restart: Option<u8>,
 }
 

@@ -148,7 +148,7 @@ impl<'a> File<'a> {
         })
     }
 
-    /// Size of an offset, and its position in the header.
+    /// Size of an offset in bytes, and the position in the header of the first page's offset.
     fn offset_width(&self) -> (usize, u64) {
         if self.is_big { (8, 8) } else { (4, 4) }
     }
@@ -158,7 +158,8 @@ impl<'a> File<'a> {
         self.number(at, width)
     }
 
-    /// All pages of the chain, each followed by its subdirectories; `None` if the chain is broken or too long.
+    /// All pages of the chain, each followed by its subdirectories; `None` if the chain is broken, circular
+    /// or too long.
     fn pages(&self) -> Option<Vec<Page>> {
         let mut pages: Vec<Page> = Vec::new();
         let mut at = self.first_page()?;

@@ -96,7 +96,7 @@ impl CameraPoseReader {
         }));
     }
 
-    /// The camera and its pose above the table at the time of a picture; `None` if no pose is known.
+    /// The camera and its pose above the table at the time of a picture; `None` for [`CameraPoseSource::Unknown`].
     pub(super) fn at(&self, header: &Header) -> Result<Option<CameraOverTable>, RosError> {
         let known = lock(&self.known);
         let refused = |expected: &str, found: String| RosError::CameraInfo { expected: expected.to_owned(), found };

@@ -95,7 +95,7 @@ impl Grasping {
     /// Begins a grasp.
     ///
     /// # Errors
-    /// An error if the speed is invalid, the model has no lengths, or the arm was stopped before.
+    /// An error if motions are blocked, the speed is invalid, the model has no lengths, or the arm is lost.
     pub(super) fn begin(&mut self, request: &GraspRequest, model: &GraspModel) -> Result<()> {
         if let Some(why) = &self.latched {
             anyhow::bail!("nothing moves until a person has checked the arm and restarts the node: {why}");

@@ -48,7 +48,7 @@ use services::{Change, Services};
 /// Interval of checks for requests while there is no picture.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Runs until `is_interrupted` returns true.
+/// Runs the node until `is_interrupted` returns true.
 ///
 /// # Errors
 /// An error if a network resource cannot be opened; received data never ends the node.

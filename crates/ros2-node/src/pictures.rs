@@ -26,7 +26,7 @@ pub(super) struct Picture {
     pub(super) captured: SystemTime,
 }
 
-/// Counters.
+/// Counters for the diagnostics.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     pub(super) received: AtomicU64,
@@ -62,7 +62,7 @@ impl Shared {
         waited.unwrap_or_else(PoisonError::into_inner).0.waiting.pop_front()
     }
 
-    /// The newest picture that was taken after a time.
+    /// The newest picture, if it was taken after a time; waits for one until the timeout.
     pub(super) fn newer_than(&self, time: SystemTime, timeout: Duration) -> Option<Picture> {
         let is_old = |kept: &mut Kept| kept.newest.as_ref().is_none_or(|newest| newest.captured < time);
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_old);

@@ -168,7 +168,7 @@ impl Services {
         }
     }
 
-    /// Answers the requests that wait for a picture taken after the call.
+    /// Answers the detection requests that were received before this picture arrived.
     pub(super) fn searched(&mut self, searched: Result<&Searched, String>, arrived: Instant) {
         let (waiting, ready) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.asked > arrived);
         self.detecting = waiting;
@@ -181,7 +181,7 @@ impl Services {
     fn answer_detection(&self, asker: Client, answer: Result<DetectResponse, String>) {
         let answer =
             answer.unwrap_or_else(|message| DetectResponse { success: false, message, ..DetectResponse::default() });
-        // A Trigger only returns whether the part was found.
+        // For a Trigger, success means that the part was found.
         let found = answer.success && !answer.detections.detections.is_empty();
         let message = answer.message.clone();
         self.detect.answer(asker, answer, found, message, &self.lines);

@@ -7,7 +7,7 @@ use crate::messages::{CameraInfo, Header};
 
 /// Centre of the first pixel in this project's convention; in ROS it is 0.
 const FIRST_CENTER_PX: f64 = 0.5;
-/// Largest difference of focal lengths and centres for the same camera, as a fraction of the picture's size.
+/// Largest difference of focal lengths and centres for the same camera, as a fraction of the picture's longer side.
 const MAX_DIFFERENCE: f64 = 0.01;
 
 fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
@@ -17,8 +17,8 @@ fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
 /// Reads the camera of a message, for unrectified pictures.
 ///
 /// # Errors
-/// [`RosError::CameraInfo`] for an uncalibrated camera, an invalid camera matrix, a lens model other than plumb_bob,
-/// binning and regions of interest.
+/// [`RosError::CameraInfo`] for an uncalibrated camera, an invalid camera matrix, a lens model other than plumb_bob
+/// (unless all coefficients are 0), binning, and a region that is not the whole picture.
 pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError> {
     let CameraInfo { width, height, distortion_model, d, k, roi, .. } = message;
     if k[0] == 0.0 {
@@ -61,8 +61,8 @@ pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError>
         .ok_or_else(|| refused("a camera matrix fx 0 cx 0 fy cy 0 0 1", format!("{k:?} for {width} × {height} pixels")))
 }
 
-/// Checks that a camera is the one in a file: that its picture size is the same, and that its intrinsics differ by at
-/// most a hundredth of the picture.
+/// Checks that a camera is the one in a file: that its picture size is the same, and that its focal lengths and its
+/// centre differ by at most a hundredth of the picture's longer side. Lenses are not compared.
 ///
 /// # Errors
 /// [`RosError::CameraInfo`] with the first difference.

@@ -55,7 +55,7 @@ pub fn to_bytes(message: &impl Cdr) -> Vec<u8> {
     writer.bytes
 }
 
-/// Reads a little-endian message without the four bytes that name the encoding; further bytes are padding.
+/// Reads a little-endian message without the four bytes that name the encoding; bytes after the message are ignored.
 ///
 /// # Errors
 /// [`CdrError`] for bytes that are not such a message.
@@ -193,7 +193,7 @@ impl Cdr for String {
     const MIN_BYTES: usize = 4;
 
     fn write(&self, to: &mut Writer) {
-        // A zero would end the text for the receiver, so that the rest is omitted.
+        // A zero would end the text for the receiver, so the text from the first zero on is omitted.
         let text = self.split('\0').next().unwrap_or_default();
         to.count(text.len() + 1);
         to.bytes.extend_from_slice(text.as_bytes());

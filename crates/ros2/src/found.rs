@@ -21,8 +21,8 @@ pub struct FoundPart {
     pub grasp: Option<(Isometry3<f64>, f64)>,
 }
 
-/// Converts detections to a message with the picture's stamp and frame. Its pixels are in ROS's convention: the first
-/// pixel's centre is (0, 0).
+/// Converts detections to a message with the picture's stamp and frame. Pixels in the message are in ROS's convention:
+/// the first pixel's centre is (0, 0).
 pub fn to_detections(header: &Header, found: &[FoundPart]) -> Detection2DArray {
     let detection = |part: &FoundPart| {
         let [from, to] = part.corners;

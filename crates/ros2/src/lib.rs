@@ -6,7 +6,7 @@
 //! ```
 //! This crate checks all data from the network: an invalid message causes an error text, never a panic.
 //!
-//! Not included: grasp models (crate `cli` connects them to the node), big-endian peers, ROS 2 itself.
+//! Not included: grasp models (crate `ros2-node` connects them to a node), big-endian peers, ROS 2 itself.
 //!
 //! ```
 //! use sdg_ros2::{cdr, encoding, messages::{Header, Image}};

@@ -41,7 +41,8 @@ enum Motion {
 }
 
 impl Transforms {
-    /// Starts without transforms. The pose of a moving frame is valid for `max_age_secs` before and after its time.
+    /// Starts without transforms. At a time outside the stored history of a moving frame, the nearest pose is used if
+    /// its time differs by at most `max_age_secs`.
     pub fn new(max_age_secs: f64) -> Self {
         Self { frames: HashMap::new(), max_age_secs }
     }

@@ -6,9 +6,9 @@ use crate::error::CalibrationError;
 
 /// Number of squares of the dot pattern along each side, more than any board has.
 pub(crate) const PATTERN_SIDE: u32 = 32;
-/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Random; of 100 seeds, the first for which, on 9
-/// × 6 squares, any two windows of 3 × 3 squares differ at every rotation, and any two of 4 × 4 differ in at least four
-/// squares (tested below).
+/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Random, from the first of 100 seeds with these
+/// properties on 9 × 6 squares (tested below): any two windows of 3 × 3 squares differ at every rotation, and any two
+/// of 4 × 4 differ in at least four squares.
 const PATTERN: [u32; PATTERN_SIDE as usize] = pattern(13);
 
 const fn pattern(seed: u64) -> [u32; PATTERN_SIDE as usize] {
@@ -38,7 +38,7 @@ pub struct Board {
 impl Board {
     /// Minimum and maximum number of squares along a side: four squares have three corners between them.
     pub const SIDES: [u32; 2] = [4, 30];
-    /// Radius of a dot, in sides of a square. Dots stay outside the neighbourhoods of saddle points, up to 0.45 sides.
+    /// Radius of a dot, in sides of a square. A dot stays outside circles of 0.45 sides around the corners.
     pub const DOT_RADIUS: f64 = 0.17;
     /// Minimum and maximum side of a square, in metres: from a board under a microscope to one on a wall.
     const SQUARES_M: [f64; 2] = [0.0005, 0.5];
@@ -169,7 +169,8 @@ mod tests {
         assert!(!board.is_inked(&Point2::new(-0.01, 0.01)) && !board.is_inked(&Point2::new(9.01, 5.9)));
         assert_eq!(board.corner([8, 5]), Point3::new(0.2, 0.125, 0.0));
         assert_eq!(board.corners().count(), board.num_corners());
-        // A dot has the opposite colour of its square: the ink differs between its centre and the square around it.
+        // A dot has the opposite colour of its square: the ink differs between the dot's centre and the square around
+        // the dot.
         let (column, row) = (0..54).map(|k| (k % 9, k / 9)).find(|(x, y)| Board::has_dot(*x, *y)).unwrap();
         let [x, y] = [column, row].map(|k| f64::from(k) + 0.5);
         assert_ne!(board.is_inked(&Point2::new(x, y)), board.is_inked(&Point2::new(x + 0.2, y)));

@@ -7,8 +7,8 @@
 //!   └──────────→ x     The origin is the outer corner of square (0, 0); z points out of the sheet, towards the reader.
 //! ```
 //! Some squares have a dot of the opposite colour in their centre. The pattern of dots is the same on boards of every
-//! size, and any two windows of three by three squares differ at every rotation. A board is therefore identified even
-//! if it is partly outside the picture, and boards of 9 × 6 and 8 × 6 squares cannot be confused.
+//! size. On 9 × 6 squares, any two windows of three by three squares differ at every rotation. A board is therefore
+//! identified even if it is partly outside the picture, and a board with more squares than expected is rejected.
 
 mod checkerboard;
 mod sheet;

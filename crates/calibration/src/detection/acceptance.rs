@@ -19,7 +19,7 @@ const MAX_OFF: f64 = 0.12;
 /// squares. The boards of the tests have at most 0.03 (dark, noisy), grids in photos of wood, metal and cloth at least
 /// 0.7.
 const MAX_VARIATION: f64 = 0.35;
-/// Sample points of a square's own colour, in sides of the square: outside a dot and inside the edges.
+/// Points at which a square's own colour is sampled, in sides of the square: outside a dot and inside the edges.
 const RING: [[f64; 2]; 8] =
     [[0.27, 0.27], [0.73, 0.27], [0.27, 0.73], [0.73, 0.73], [0.18, 0.5], [0.82, 0.5], [0.5, 0.18], [0.5, 0.82]];
 
@@ -46,7 +46,7 @@ fn off(corners: &[SeenCorner]) -> Option<f64> {
     Some((squares.sum::<f64>() / corners.len() as f64).sqrt())
 }
 
-/// Variation of brightness within squares, over its difference between neighbouring squares.
+/// Variation of brightness within squares, divided by the difference of brightness between neighbouring squares.
 fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
     let pixels: BTreeMap<[u32; 2], Point2<f64>> = corners.iter().map(|seen| (seen.corner, seen.pixel)).collect();
     let rings = pixels.keys().filter_map(|&[i, j]| {

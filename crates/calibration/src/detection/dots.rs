@@ -22,10 +22,10 @@ const MAX_CONTRADICTION: f64 = 0.2;
 const MIN_MARGIN: f64 = 1.5;
 /// Number of found corners that may lie outside the board.
 const MAX_OUTSIDE: usize = 2;
-/// If every square's value is below this one, the board is a plain checkerboard.
+/// If the mean of the squares' values is below half of this, the board is a plain checkerboard.
 const MAX_PLAIN: f64 = 0.3;
-/// Distance of the sample points of a square's own colour from its centre, in sides: outside a dot and inside the
-/// edges.
+/// Distance from a square's centre of the points at which the square's own colour is sampled, in sides: outside a dot
+/// and inside the edges.
 const RING: f64 = 0.32;
 
 /// Finds the grid's placement on the board.
@@ -135,8 +135,9 @@ fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     is_clear.then(|| turned.corners(grid, sides))
 }
 
-/// The placement of a board without dots, which must be completely visible. The colours of the squares
-/// distinguish it from the same board rotated by 180 degrees.
+/// The placement of a board without dots. The board must be completely visible. The colours of its squares distinguish
+/// it from the same board rotated by 180 degrees if one side has an odd and the other an even number of squares;
+/// otherwise `None`.
 fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
     let sides = [board.columns(), board.rows()];
     if grid.len() != board.num_corners() {
@@ -156,7 +157,7 @@ struct Turned {
 }
 
 impl Turned {
-    /// All placements with at most [`MAX_OUTSIDE`] rows or columns outside the board.
+    /// All placements with at most one row or column of corners beyond each side of the board.
     fn all(grid: &Grid, [columns, rows]: [u32; 2]) -> impl Iterator<Item = Self> {
         (0..4).flat_map(move |quarters| {
             let turned = Self { quarters, shift: [0, 0] };
@@ -193,7 +194,8 @@ impl Turned {
         ((column + row).rem_euclid(2) == 0) == grid.first_is_dark
     }
 
-    /// Number of squares that contradict the board; `None` if too many corners lie outside.
+    /// Number of squares whose dots contradict the board, plus the number of corners outside the board; `None` for more
+    /// than [`MAX_OUTSIDE`] such corners.
     fn contradiction(&self, grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<f64> {
         let outside = grid.len() - self.corners(grid, sides).len();
         if outside > MAX_OUTSIDE {

@@ -1,7 +1,7 @@
 //! Grows a grid from one saddle point, neighbour by neighbour.
 //!
 //! Legend: a grid's positions `[i, j]` count from the first saddle point, and may be negative. The axes `i` and `j`
-//! have the same orientation as the board's x and y seen from its printed side: `j` is to the left of `i` (y of pixels
+//! have the same orientation as the board's x and y seen from the printed side: `j` is to the left of `i` (y of pixels
 //! points down).
 
 use std::collections::{BTreeMap, VecDeque};
@@ -16,7 +16,7 @@ pub(super) type Place = [i32; 2];
 /// The four neighbours of a position: offset, axis and sign.
 const NEIGHBOURS: [(Place, usize, f64); 4] =
     [([1, 0], 0, 1.0), ([-1, 0], 0, -1.0), ([0, 1], 1, 1.0), ([0, -1], 1, -1.0)];
-/// Largest distance of a neighbour from the position predicted by the last step, in steps. Perspective shortens steps
+/// Largest distance of a neighbour from its predicted position, in steps. Perspective shortens steps
 /// by up to a sixth.
 const MAX_OFF: f64 = 0.3;
 /// Largest deviation of the first neighbours from the edges' directions: the sine of 14 degrees.
@@ -113,7 +113,7 @@ pub(super) fn grow_all(saddles: &[Saddle]) -> Vec<Grid> {
 struct Growth<'a> {
     saddles: &'a [Saddle],
     members: BTreeMap<Place, usize>,
-    /// Steps to the next place along i and j, by place.
+    /// Steps to the next positions along i and j, by position.
     steps: BTreeMap<Place, [Vector2<f64>; 2]>,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Growth<'a> {
         self.members
     }
 
-    /// The step to the next position: the last step along this axis, or the step of the neighbouring row.
+    /// The step to the next position: that of a neighbouring row if known, otherwise the last step along this axis.
     fn step(&self, [i, j]: Place, axis: usize, sign: f64) -> Vector2<f64> {
         let [along, across] = if axis == 0 { [[1, 0], [0, 1]] } else { [[0, 1], [1, 0]] };
         let sign_i = sign as i32;

@@ -1,9 +1,9 @@
 //! Finds the board in a picture: corners with subpixel accuracy, each with its position on the board.
 //!
 //! ```text
-//! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
-//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution         dots.rs, refine.rs
-//!         ─ rejected if the corners are not in a plane or the squares are unequal                      acceptance.rs
+//! picture ─ halved step by step ─ saddle points ─ grid grown from neighbour to neighbour        saddle.rs, grid.rs
+//!         ─ dots read: position and rotation on the board ─ corners refined at full resolution  dots.rs, refine.rs
+//!         ─ rejected if the corners are not in a plane or brightness varies within squares      acceptance.rs
 //! ```
 //! A grid is extended from its last steps, so that distortion and perspective need not be known. The first pixel's
 //! centre is at (0.5, 0.5).
@@ -29,7 +29,8 @@ pub const MIN_CORNERS: usize = 9;
 /// Pictures are halved as long as their longer side stays at least this: corners of a blurred picture are only found at
 /// low resolution.
 const MIN_SIDE: u32 = 160;
-/// Larger pictures are first searched at half size: there, smoothing does not hide the sharp corners of large squares.
+/// Larger pictures are halved before the first search: at lower resolution, smoothing does not hide the sharp corners
+/// of large squares.
 const MAX_SIDE: u32 = 2000;
 
 /// Finds the board, which may be partly outside the picture.

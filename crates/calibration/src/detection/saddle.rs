@@ -22,7 +22,7 @@ pub(super) struct Saddle {
 const SIGMA: f64 = 1.5;
 /// Minimum contrast between dark and light squares, in grey levels: a tenth of a board's contrast in the dark.
 const MIN_CONTRAST: f64 = 10.0;
-/// Largest ratio of the two curvatures, which excludes noisy edges. It is 3 for squares seen at 70 degrees.
+/// Largest ratio of the two curvatures; noisy edges have larger ratios. The ratio is 3 for squares seen at 70 degrees.
 const MAX_CURVATURE_RATIO: f64 = 8.0;
 /// Distance at which brightness is compared with the opposite side, in pixels: larger than the smoothing, and within
 /// squares of six pixels.
@@ -86,8 +86,7 @@ impl Saddle {
         [(e + f * slope).normalize(), (e - f * slope).normalize()]
     }
 
-    /// Whether dark and light squares are exchanged between two corners, which is the case for neighbours along an
-    /// edge.
+    /// Whether dark and light squares are exchanged between two corners, as for neighbours along an edge.
     pub(super) fn is_opposite(&self, other: &Self) -> bool {
         // The trace of the product of the traceless parts of both forms: 1 for equal forms, -1 for forms rotated by 90
         // degrees.

@@ -121,7 +121,7 @@ impl<'a> Bundle<'a> {
             let p = camera_from_flange * in_flange;
             let projected = project(&self.camera, &p)?;
             let mut by_shared = SMatrix::<f64, 2, NUM_SHARED>::zeros();
-            // The small motions apply after X and Y; X⁻¹ is therefore preceded by the inverse motion.
+            // The small motions are the right factors of X and Y, so the inverse motion is the left factor of X⁻¹.
             by_shared.fixed_view_mut::<2, 6>(0, 0).copy_from(&-(projected.by_point * by_twist(&p)));
             by_shared.fixed_view_mut::<2, 6>(0, 6).copy_from(&(projected.by_point * turn_of_y * by_twist(&b)));
             by_shared.fixed_view_mut::<2, 1>(0, SCALE).copy_from(&(projected.by_point * turn_of_y * told.coords));

@@ -18,14 +18,14 @@ use crate::error::CalibrationError;
 
 /// Largest fraction of the reprojection error that may remain with another reading of the poses.
 const MAX_SHARE: f64 = 0.3;
-/// Largest fraction of the error that may remain without a few wrong poses, which then cause three quarters of the
-/// squared error.
+/// Largest fraction of the error that may remain without a few wrong poses: these poses then cause three quarters of
+/// the squared error.
 const MAX_SHARE_OF_FEW: f64 = 0.5;
 /// Largest residual of an explanation beyond the corners' own errors, in radians of the picture: 5 px at a focal length
 /// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees causes as much.
 const MAX_RESIDUAL_RAD: f64 = 0.007;
 /// Largest residual of the closed form for which the minimum is searched; the search takes long if there is no minimum.
-/// Robot errors of [`MAX_RESIDUAL_RAD`] cause a fifth of it between two pictures.
+/// Robot errors of [`MAX_RESIDUAL_RAD`] cause a fifth of this residual between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
 /// Ratio of two explanations' residuals up to which they count as equal.
 const ALIKE: f64 = 1.2;
@@ -38,8 +38,8 @@ const MIN_SCALE_SIGMAS: f64 = 5.0;
 /// Number of remaining equations below which the standard error itself is uncertain, so that more standard errors are
 /// required: with four pictures, which leave 11 equations, three times as many.
 const FEW_EQUATIONS: f64 = 30.0;
-/// Largest fraction of the robot's errors that may remain with another size of the board, which then causes a quarter
-/// of the squared error.
+/// Largest fraction of the robot's errors that may remain with another size of the board: the wrong size then causes a
+/// quarter of the squared error.
 const MAX_ROBOT_SHARE: f64 = 0.85;
 /// Largest difference between the rotations of robot and board between two pictures, in radians: 3 degrees, twice
 /// [`MAX_ROBOT_SCALE`].
@@ -224,7 +224,7 @@ fn evidence_rms_px(evidence: &Evidence) -> f64 {
     (squares / num as f64).sqrt()
 }
 
-/// The hint for a robot that rotates by other angles than the board, which no error in translations explains.
+/// The hint for a robot that rotates by other angles than the board: no error in translations explains this.
 fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<String> {
     let boards = evidence.boards();
     let turn = |poses: &[Isometry3<f64>], k: usize| poses[k].rotation.angle_to(&poses[k - 1].rotation);

@@ -48,7 +48,8 @@ impl Composition {
         }
     }
 
-    /// Both sets of angles of a rotation: with the middle angle within 90 degrees, and beyond.
+    /// Both sets of values of a rotation: angles with the middle angle within 90 degrees, and beyond; or the rotation
+    /// vectors in both directions.
     fn angles(self, rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 2] {
         match self {
             // Only products in order are decomposed.
@@ -103,9 +104,9 @@ impl Recomposition {
         of_both.map(|values| self.meant.rotation(&values.map(|value| self.unit * value)))
     }
 
-    /// The intended rotations, one candidate for each of the first picture's two. Of each further picture's two, the
-    /// one is taken whose rotation since the two previous pictures agrees with the board's. `turns` returns the board's
-    /// rotation between two pictures.
+    /// The intended rotations. Each picture has two candidates; `first` (0 or 1) is the candidate of the first picture.
+    /// For each further picture, the rotations of both candidates since the two previous pictures are compared with the
+    /// board's, and the better candidate is taken. `turns` returns the board's rotation between two pictures.
     pub(super) fn apply(
         &self,
         rotations: &[UnitQuaternion<f64>],
@@ -126,7 +127,7 @@ impl Recomposition {
     }
 
     /// All combinations that are tried for one unit of angles, the more likely ones first: other orders of the
-    /// rotations about x, y and z; angles that belong to other axes; rotation vectors; proper Euler angles.
+    /// rotations about x, y and z; rotation vectors; angles that belong to other axes; proper Euler angles.
     pub(super) fn all(unit: f64) -> Vec<Self> {
         let mut all = Vec::new();
         let mut add = |composed, meant| all.push(Self { composed, meant, unit });
@@ -214,7 +215,7 @@ mod tests {
         };
         let off = recomposition.meant(&composed).map(|found| found.angle_to(&meant));
         assert!(off[0] > 0.1 && off[1] < 1e-7, "{off:?}");
-        // The first rotation is given; for the second, the rotation since then is.
+        // The candidate of the first picture is given; that of the second follows from the board's rotation, here 0.
         let turns = |_: usize, _: usize| 0.0;
         let found = recomposition.apply(&[composed; 2], 1, &turns);
         assert!(found.iter().all(|found| found.angle_to(&meant) < 1e-7));

@@ -17,7 +17,8 @@ pub(super) enum MixedUp {
 
 /// Largest fraction of the closed form's residual that may remain.
 const MAX_SHARE: f64 = 0.5;
-/// Ratio of residuals below which another choice is equally plausible, so that the wrong pose is unknown.
+/// Ratio of another choice's residual to the smallest one, up to which both are equally plausible, so that the wrong
+/// pose is unknown.
 const MIN_AMBIGUITY: f64 = 2.0;
 /// Minimum numbers of pictures for naming one wrong pose, and two. With fewer, the other poses agree by chance if the
 /// robot is merely inaccurate.

@@ -40,7 +40,7 @@ struct Pose {
     rotation_xyzw: Vec<f64>,
 }
 
-/// Maximum distance of the flange from the base, in metres: larger than any arm's reach.
+/// Maximum distance of the flange from the base along each axis, in metres: larger than any arm's reach.
 const MAX_REACH_M: f64 = 5.0;
 /// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;

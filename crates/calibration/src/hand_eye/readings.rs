@@ -43,9 +43,10 @@ const READINGS: [(&str, bool, OfPose); 8] = [
     ("the rotations seem to be transposed, and the mount to be the other one", true, |pose| transposed(pose).inverse()),
 ];
 
-/// Largest fraction of the closed form's residual with the given rotations that may remain with other rotations.
+/// A reading of Euler angles is kept if its closed-form residual is below this fraction of the residual of the given
+/// rotations.
 const MAX_TURNS_SHARE: f64 = 0.5;
-/// Number of readings of Euler angles that are evaluated further: the ones with the smallest closed-form residuals.
+/// Number of readings of Euler angles that are evaluated further: the most likely of those with the smallest residuals.
 const NUM_EULER: usize = 3;
 /// Ratio of two readings' residuals up to which they count as equal.
 const ALIKE: f64 = 1.1;
@@ -55,7 +56,7 @@ const ROUNDING_RAD: f64 = 1e-5;
 /// about each axis is then 3.14 "degrees".
 const MAX_TINY_RAD: f64 = 0.1;
 
-/// All readings whose rotations match the board's no worse than the given ones do, the simplest first.
+/// The readings whose rotations match the board's at least as well as the given ones do, the simplest first.
 pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
     let left = |robot: &[Isometry3<f64>]| {
         let motions: Vec<_> = robot.iter().map(|pose| motion(mount, pose)).collect();

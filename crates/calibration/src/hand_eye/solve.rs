@@ -153,7 +153,7 @@ impl<'a> Solved<'a> {
         Some([self.minimum.at.board_scale, variance.max(0.0).sqrt()])
     }
 
-    /// The variance, in squared pixels, with the weighted errors of the robot included.
+    /// The variance of the residuals, in squared pixels: of the corners, and of the weighted errors of the robot.
     pub(super) fn variance(&self) -> f64 {
         self.corner_sigma_px * self.corner_sigma_px
     }
@@ -162,8 +162,8 @@ impl<'a> Solved<'a> {
     pub(super) fn without_each(&self) -> Vec<Isometry3<f64>> {
         let all = &self.minimum.at;
         (0..all.num_views())
-            // If no solution exists without a picture, the result depends on it: the change is then as large as the
-            // pose itself.
+            // If no solution exists without a picture, the result depends on this picture: the change is then as
+            // large as the pose itself.
             .map(|k| minimise(all.without(k)).map_or(Isometry3::identity(), |minimum| minimum.at.x))
             .collect()
     }

@@ -68,7 +68,7 @@ impl Calibration {
 /// The result for one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureFit {
-    /// RMS error of the corners; for an excluded picture, with the camera estimated without it.
+    /// RMS error of the corners; for an excluded picture, with the camera estimated from the others.
     pub rms_px: f64,
     /// Pose of the board in the camera's frame.
     pub camera_from_board: Isometry3<f64>,
@@ -131,7 +131,8 @@ fn too_few(found: usize, hint: &'static str) -> CalibrationError {
     CalibrationError::TooFewPictures { least: MIN_PICTURES, found, hint }
 }
 
-/// The better of two results: starting at the closed form's focal length, and at the picture's longer side.
+/// The better of two minima: one from the closed form's focal length, the other from the picture's longer side as the
+/// focal length.
 fn first_fit<'a>(
     board: &Board,
     pictures: &'a [Vec<SeenCorner>],
@@ -228,7 +229,7 @@ fn alike(bundle: &Bundle<'_>, hint: String) -> CalibrationError {
     CalibrationError::PosesAlike { found: format!("tilts that differ by {range:.0} degrees at most"), hint }
 }
 
-/// The result for every picture with the camera, including the excluded ones.
+/// The result for every picture with the estimated camera, including the excluded pictures.
 fn fits(
     board: &Board,
     pictures: &[Vec<SeenCorner>],

@@ -1,8 +1,8 @@
 //! The focal length of an uncalibrated camera from one picture of the sheet, and the effect of its error.
 //!
 //! Assumptions: square pixels, no lens distortion, and an optical axis near the centre of the picture. A sheet seen
-//! vertically from above has the same picture at every focal length (twice as long, twice as far away), so the accuracy
-//! of the focal length increases with the tilt.
+//! vertically from above has the same picture at every focal length (twice the focal length at twice the distance), so
+//! the accuracy of the focal length increases with the tilt.
 
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
@@ -91,9 +91,9 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show it.
+    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point.
     pub at_sheet_m: f64,
-    /// Largest error along the picture's border, in metres, where it shows the plane at that height.
+    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height.
     pub at_border_m: f64,
 }
 

@@ -71,7 +71,7 @@ pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
             ];
             let tilts = [random.within(-0.36, 0.36), random.within(-0.36, 0.36), random.within(-0.3, 0.3)];
             let pose = camera_from_board(&board, camera, pixel, distance, tilts);
-            // The white margin around the board is one square wide.
+            // The board's outer corners, not the white margin around the board, must be visible.
             let rim = [[0, 0], [0, board.rows()], [board.columns(), 0], [board.columns(), board.rows()]];
             let is_whole = rim.iter().all(|corner| {
                 camera.project(&(pose * board.corner(*corner))).is_some_and(|pixel| {

@@ -54,8 +54,8 @@ impl Exposure {
     pub const ORDINARY: Self = Self { ink: 35.0, paper: 215.0, falloff: 0.25, blur: 1, noise: 2.0 };
 }
 
-/// A rotation about `axis`, given by the tangent of half the angle: it needs no sine, whose rounding depends on the
-/// machine.
+/// A rotation about `axis`, given by the tangent of half the angle. No sine is needed: the rounding of a sine depends
+/// on the machine.
 pub fn turn(axis: [f64; 3], half_tangent: f64) -> UnitQuaternion<f64> {
     let [x, y, z] = axis.map(|value| value * half_tangent);
     UnitQuaternion::from_quaternion(Quaternion::new(1.0, x, y, z))
@@ -121,7 +121,7 @@ pub fn render_with(
             (false, false) => 0.5 * (exposure.ink + exposure.paper),
         }
     };
-    // Four pixels have a common corner.
+    // A corner belongs to up to four pixels; its brightness is computed once.
     let places: Vec<Option<(Point2<f64>, f64)>> =
         places.into_iter().map(|place| place.map(|place| (place, brightness(&place)))).collect();
     let mut values = vec![0.5 * (exposure.ink + exposure.paper); width * height];
@@ -142,7 +142,8 @@ pub fn render_with(
     })
 }
 
-/// The mean over a pixel, from its corners and their brightness; from 16 × 16 samples if these differ.
+/// The mean over a pixel, from its corners and their brightness; from 16 × 16 samples if the corners' brightness
+/// differs.
 fn mean_over(corners: [(Point2<f64>, f64); 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
     const SIDE: usize = 16;
     let [a, b, c, d] = corners.map(|(place, _)| place);

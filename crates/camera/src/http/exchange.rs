@@ -37,7 +37,7 @@ pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Ans
     for _ in 0..=MAX_REDIRECTS {
         let known = login.authorization(&url).unwrap_or_default();
         let reply = match get_once(&url, known.as_deref(), deadline)? {
-            // Also if the previous authentication is no longer valid.
+            // The server also sends challenges if the previous authentication is no longer valid.
             Reply::Challenges(challenges) => {
                 login.challenged(&url, &challenges)?;
                 get_once(&url, login.authorization(&url)?.as_deref(), deadline)?
@@ -76,7 +76,7 @@ impl Login {
         Ok(())
     }
 
-    /// The value of the Authorization header; `None` if the server has not requested it.
+    /// The value of the Authorization header; `None` if the server has not requested it, or the address has no user.
     fn authorization(&mut self, url: &Url) -> Result<Option<String>, String> {
         let (Some(client), Some((username, password))) = (&mut self.0, url.credentials()) else { return Ok(None) };
         let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };

@@ -26,7 +26,7 @@ use crate::source::{Missing, Source};
 
 pub use url::Url;
 
-/// Sends a request, and determines from the response which of the two kinds of server it is.
+/// Sends a request, and determines from the response whether the server sends motion JPEG or single pictures.
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
     let refused = |why: String| CameraError::Open { address: url.to_string(), why };
     let mut login = exchange::Login::default();
@@ -49,9 +49,9 @@ pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Re
     }
 }
 
-/// The first pictures of a server, at most `max_pictures`, without torn ones. Unlike a [`Camera`](crate::Camera), this
-/// function does not reconnect when the connection is lost, so it ends with the server. It is meant for tests of
-/// servers and of the client.
+/// The first pictures of a server. Torn pictures count towards `max_pictures`, but are not returned. Unlike a
+/// [`Camera`](crate::Camera), this function does not reconnect: it returns when the connection is lost or no picture
+/// arrives within `timeout`. It is meant for tests of servers and of the client.
 ///
 /// # Errors
 /// [`CameraError::Open`] if the server's first response is not a camera's.

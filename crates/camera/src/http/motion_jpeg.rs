@@ -35,7 +35,7 @@ impl MotionJpeg {
     fn catch_up(&mut self, mut part: Vec<u8>) -> (Vec<u8>, u64) {
         let start = Instant::now();
         let mut num_skipped = 0;
-        // The next call finds the invalid framing again and reports it.
+        // Invalid framing only ends this loop: the next call finds it again and reports it.
         loop {
             match self.multipart.next_part() {
                 Ok(Some(newer)) => {

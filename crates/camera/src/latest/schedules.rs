@@ -1,5 +1,5 @@
-//! All orders of up to seven steps of a camera's thread and a caller at the newest frame, compared with a model without
-//! threads. Steps do not overlap, because every operation on the cell holds one lock.
+//! All orders of up to seven steps of a camera's thread and of a caller of [`LatestFrame`] (the cell), compared with a
+//! model without threads. Steps do not overlap, because every operation on the cell holds one lock.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::channel;
@@ -15,7 +15,7 @@ const MAX_TURNS: u32 = 7;
 enum Turn {
     /// The camera delivers a frame.
     Frame,
-    /// The camera delivers a torn frame.
+    /// The camera reports a fault.
     Torn,
     /// The caller takes the current frame or error.
     Take,

@@ -23,7 +23,7 @@ pub(super) fn paths() -> Vec<PathBuf> {
     paths.into_iter().map(|(_, path)| path).collect()
 }
 
-/// The card, driver and formats of one node; the formats are empty if it does not capture pictures.
+/// The card, driver and formats of one node; the formats are empty if the node does not capture pictures.
 pub(super) fn read(path: &Path) -> std::io::Result<Node> {
     let device = Device::open(path)?;
     let card = device.capabilities()?;

@@ -143,7 +143,7 @@ impl Stream {
         }
         let bytes_per_row = given.bytes_per_line() as usize;
         if let Some(fps) = options.fps {
-            // The driver uses the nearest rate that it supports, which is visible in the times of the frames. A driver
+            // The driver uses the nearest rate that it supports; the times of the frames show this rate. A driver
             // without frame rates returns an error.
             let interval = Fract::new(1000, (fps * 1000.0).round() as u32);
             capture.set_frame_interval(interval).map_err(|error| ("does not accept the frame rate", error))?;

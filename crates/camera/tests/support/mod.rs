@@ -46,8 +46,7 @@ pub fn open(address: &str) -> Box<dyn Camera> {
     try_open(address).unwrap()
 }
 
-/// A server on 127.0.0.1, one connection at a time, until it is dropped. Connections closed by the client are
-/// abandoned.
+/// A server on 127.0.0.1 that reads one request at a time, until it is dropped.
 pub struct Server {
     port: u16,
     is_stopped: Arc<AtomicBool>,
@@ -55,7 +54,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts a server. Each connection runs its script; later ones run `further`.
+    /// Starts a server. The n-th connection runs the n-th script; later connections run `further`.
     pub fn start(scripts: Vec<Script>, further: Script) -> Self {
         Self::start_at(0, scripts, further)
     }

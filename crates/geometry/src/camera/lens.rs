@@ -63,7 +63,7 @@ impl PlumbBob {
                 return self.grows_up_to(found.coords.norm_squared()).then_some(found);
             }
             let step = self.jacobian(&found).try_inverse()? * off;
-            // A longer step would lead beyond the radius at which the polynomial decreases again.
+            // At most 1: a longer step may lead beyond the radius at which the polynomial decreases again.
             found += step * (1.0 / step.norm()).min(1.0);
         }
         None
@@ -101,7 +101,7 @@ impl PlumbBob {
         )
     }
 
-    /// Whether the distorted radius increases with the radius, from the centre up to the root of `r2`.
+    /// Whether the distorted radius (radial terms only) increases with the radius, from the centre up to `√r2`.
     fn grows_up_to(&self, r2: f64) -> bool {
         // d(r radial)/dr is smallest where its derivative by r² is zero: 3 k1 + 10 k2 r² + 21 k3 r⁴ = 0.
         let growth = |t: f64| 1.0 + t * (3.0 * self.k1 + t * (5.0 * self.k2 + t * 7.0 * self.k3));
@@ -127,7 +127,7 @@ mod tests {
         // 0.6086 is the largest radius in the distorted picture.
         assert!(lens.undistort(&Point2::new(0.6, 0.0)).is_some());
         assert_eq!(lens.undistort(&Point2::new(0.7, 0.0)), None);
-        // The distorted radius decreases between 0.84 and 1.6 and then increases again: its derivative has two roots.
+        // The distorted radius decreases between 0.84 and 1.38 and then increases again: its derivative has two roots.
         let lens = PlumbBob { k1: -0.65, k2: 0.15, ..PlumbBob::NONE };
         assert_eq!(lens.distort(&Point2::new(2.5, 0.0)), None);
     }

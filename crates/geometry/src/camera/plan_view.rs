@@ -11,8 +11,8 @@
 //! world. An angle in the plan view, from x towards y, is therefore minus the same angle about the world's z.
 //!
 //! Only points of the plane are shown at their true position. Let the camera be at height `H` above the plane, and a
-//! point at height `h` above it, at the horizontal distance `d` from the camera: the point is displaced outwards by `d
-//! h / (H − h)`. With H = 0.58 m, d = 150 mm and h = 30 mm, this is 8 mm.
+//! point at height `h` above the plane, at the horizontal distance `d` from the camera: the point is displaced outwards
+//! by `d h / (H − h)`. With H = 0.58 m, d = 150 mm and h = 30 mm, this is 8 mm.
 
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
@@ -124,7 +124,7 @@ impl PlanView {
         Point2::new(point.x - self.left_m, self.top_m - point.y) * self.pixels_per_m
     }
 
-    /// Maps a pixel of the plan view to the camera's picture; `None` if the picture does not show it.
+    /// Maps a pixel of the plan view to the camera's picture; `None` if the picture does not show that point.
     pub fn in_picture(&self, camera: &PosedCamera, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         let seen = camera.project(&self.point(pixel))?;
         let [width, height] = [camera.intrinsics.width, camera.intrinsics.height].map(f64::from);

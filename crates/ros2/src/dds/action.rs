@@ -165,7 +165,8 @@ where
         feedback.map(Some).map_err(|source| RosError::Malformed { topic: self.name.clone(), source })
     }
 
-    /// The last reported status of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` without a report.
+    /// The newest status of a goal in the reports since the last call, 1 to 6 as in `action_msgs/msg/GoalStatus`;
+    /// `None` without a report of this goal.
     ///
     /// # Errors
     /// Errors reported by the network.
@@ -178,7 +179,7 @@ where
         Ok(status)
     }
 
-    /// Asks the server to cancel a goal; returns whether it accepts.
+    /// Asks the server to cancel a goal; returns whether the server accepts.
     ///
     /// # Errors
     /// No answer in time, and errors reported by the network.

@@ -20,7 +20,7 @@ const MAX_ENDED: usize = 16;
 /// A client's request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Asked<G> {
-    /// An accepted goal; the previous goal was aborted.
+    /// An accepted goal. A goal that was still running has been aborted.
     Goal(G),
     /// A cancellation of the running goal.
     Cancel,
@@ -53,7 +53,8 @@ where
         Self { name, inner, running: None, ended: Vec::new(), waiting: Vec::new() }
     }
 
-    /// The next request, without waiting; `accepts` decides whether a valid goal is accepted.
+    /// The next request, without waiting; `None` if there is none, or the request was refused. `accepts` decides
+    /// whether a valid goal is accepted.
     ///
     /// # Errors
     /// Errors reported by the network.

@@ -38,7 +38,8 @@ const MAX_DELAY_SECS: f64 = 5.0;
 const MAX_HAND: Duration = Duration::from_secs(15);
 /// Time without joint states after which the driver counts as disconnected.
 const MAX_STATE_AGE: Duration = Duration::from_millis(500);
-/// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 per second, and networks delay them.
+/// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 states per second, and networks delay
+/// them.
 const MAX_SILENCE_SECS: f64 = 0.5;
 /// Interval of checks while hand or arm moves.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -118,7 +119,7 @@ impl TrajectoryArm {
         })
     }
 
-    /// Passes a new state to `watch` and returns its reason to stop the arm.
+    /// Passes a new state to `watch` and returns the watch's reason to stop the arm.
     fn observe(&self, watch: &mut Watch, seen_secs: &mut f64) -> Result<Option<StopReason>> {
         let state = self.arm_state(ArmMode::Moving)?;
         if state.time_secs == *seen_secs {
@@ -182,7 +183,8 @@ impl TrajectoryArm {
     }
 }
 
-/// The error of a motion that was then cancelled: after a stop that failed, the robot may still move.
+/// The error to report for a motion that failed with `error` and was then cancelled. If the cancellation of a stopped
+/// motion failed, that error is reported, because the robot may still move.
 fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
     match (error, cancelled) {
         (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,
@@ -309,7 +311,7 @@ impl Arm for TrajectoryArm {
         let (end, result) = match self.hand_end(goal, watch) {
             Ok(ended) => ended,
             Err(error) => {
-                // The fingers may still move. If they cannot be stopped now, `stop` tries it again.
+                // The fingers may still move. If they cannot be stopped now, a later call of `stop` tries again.
                 self.hand = Some((command, goal));
                 let stopped = self.stop();
                 return Err(more_serious(error, stopped));
@@ -357,7 +359,8 @@ impl Arm for TrajectoryArm {
         Ok(())
     }
 
-    /// Recovers nothing, because errors are recovered at the arm's driver.
+    /// Recovers nothing, because errors are recovered at the arm's driver. Forgets the commanded position, and checks
+    /// that joint states arrive.
     fn recover(&mut self) -> Result<()> {
         self.commanded = None;
         self.known().map(drop)

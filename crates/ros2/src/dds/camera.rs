@@ -33,7 +33,7 @@ pub struct TopicAddress {
     pub is_reliable: bool,
     /// The domain: `ROS_DOMAIN_ID`, unless the option gives another one.
     pub domain_id: u16,
-    /// Whether only this computer is used.
+    /// Whether only connections within this computer are used.
     pub is_loopback_only: bool,
 }
 
@@ -96,7 +96,7 @@ enum Pictures {
 
 /// A camera whose pictures come from a topic.
 pub struct RosCamera {
-    // The node is kept because its topics end with it.
+    // The node is kept because its topics end when it is dropped.
     _node: Node,
     pictures: Pictures,
     name: Arc<str>,

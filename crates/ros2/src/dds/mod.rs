@@ -1,7 +1,6 @@
 //! The network: nodes, topics, services and actions, and a camera and an arm that use them.
 //!
-//! Calls block for at most a given time; there is no asynchronous runtime. All types except [`Node`] may be moved to
-//! another thread.
+//! Calls block for at most a given time; there is no asynchronous runtime.
 
 mod action;
 mod action_server;

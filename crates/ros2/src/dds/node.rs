@@ -60,12 +60,12 @@ pub(super) const MAX_DOMAIN: u16 = 232;
 /// The kernel limits the value.
 const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 
-/// Interval of calling `wait_for_service` again. The function checks the matches when it is called and then waits for
-/// events, of which `ros2-client` keeps eight and drops the rest: if the endpoints of two actions are matched within a
-/// millisecond, the last event may be dropped.
+/// Interval after which `wait_for_service` is called again. The function checks the matches when it is called and then
+/// waits for events, of which `ros2-client` keeps eight and drops the rest: if the endpoints of two actions are matched
+/// within a millisecond, the last event may be dropped.
 const MATCH_AGAIN: Duration = Duration::from_millis(100);
-/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore its messages before the answer; see
-/// action.rs.
+/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore the writer's messages before the
+/// answer; see action.rs.
 const SETTLE: Duration = Duration::from_millis(200);
 
 /// The settings of a node before it joins.
@@ -92,7 +92,7 @@ impl NodeConfig {
 
 /// A node on the network, until it is dropped.
 pub struct Node {
-    // This must be dropped first, because that ends the spinner.
+    // Dropped first, because dropping the inner node ends the spinner.
     node: Option<ros2_client::Node>,
     naming: Naming,
     rmw: Rmw,
@@ -103,7 +103,7 @@ impl Node {
     /// Joins the network.
     ///
     /// # Errors
-    /// [`RosError`] without a socket, and for an invalid name.
+    /// [`RosError`] for an invalid domain or name, and without a socket.
     pub fn join(config: NodeConfig) -> Result<Self, RosError> {
         let NodeConfig { naming, domain_id, rmw, is_loopback_only, parameters } = config;
         if domain_id > MAX_DOMAIN {
@@ -144,7 +144,7 @@ impl Node {
         &self.naming
     }
 
-    /// Receives a topic's messages.
+    /// Subscribes to a topic.
     ///
     /// # Errors
     /// [`RosError`] for an invalid name, and errors reported by the network.
@@ -159,7 +159,7 @@ impl Node {
         Ok(Subscription::new(absolute, inner))
     }
 
-    /// Sends messages to a topic.
+    /// Creates a publisher for a topic.
     ///
     /// # Errors
     /// As for [`Self::subscribe`].
@@ -174,7 +174,7 @@ impl Node {
         Ok(Publisher::new(absolute, inner))
     }
 
-    /// Answers a service's requests.
+    /// Creates the server of a service.
     ///
     /// # Errors
     /// As for [`Self::subscribe`].
@@ -218,7 +218,7 @@ impl Node {
         Ok(ActionClient::new(absolute, inner))
     }
 
-    /// Serves an action.
+    /// Creates the server of an action.
     ///
     /// # Errors
     /// As for [`Self::subscribe`].
@@ -291,7 +291,7 @@ impl Drop for Node {
     fn drop(&mut self) {
         self.node = None;
         if let Some(spinner) = self.spinner.take() {
-            // After a panic, its thread has already printed a message.
+            // If the spinner's thread panicked, it has already printed a message.
             let _ = spinner.join();
         }
     }

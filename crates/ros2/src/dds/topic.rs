@@ -69,7 +69,7 @@ pub struct Subscription<T: Cdr + 'static> {
 pub struct Received<T> {
     /// The message.
     pub message: T,
-    /// The time at which it was taken from the network.
+    /// The time at which the message was taken from the network.
     pub arrived: Instant,
 }
 
@@ -104,7 +104,7 @@ impl<T: Cdr + 'static> Subscription<T> {
         self.num_lost.load(Ordering::Relaxed)
     }
 
-    /// Counts the messages of a sender that are missing before this one, which the sender numbers consecutively.
+    /// Counts the sender's messages that are missing before this one. A sender numbers its messages consecutively.
     fn count(&self, sender: Gid, number: i64) {
         let mut last_numbers = self.last_numbers.lock().unwrap_or_else(PoisonError::into_inner);
         if last_numbers.len() >= MAX_SENDERS && !last_numbers.contains_key(&sender) {

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 /// channel.
 const POLL_EVERY: Duration = Duration::from_millis(100);
 
-/// Whether the future was woken, and the thread to unpark. The thread's own token is not sufficient: code below the
-/// future consumes it if that code parks the thread.
+/// Whether the future was woken, and the thread to unpark. The thread's own token is not sufficient: code that the
+/// future calls may park the thread and thereby consume the token.
 struct Woken(AtomicBool, Thread);
 
 impl Wake for Woken {

@@ -30,7 +30,8 @@ impl Duration {
     }
 }
 
-/// A result as in `*_GetResult_Response`, where the one byte of the status precedes it and shifts its alignment.
+/// A result as in `*_GetResult_Response`, where the one byte of the status precedes the result and shifts its
+/// alignment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AfterStatus<T>(pub T);
 

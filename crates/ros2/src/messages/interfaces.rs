@@ -9,7 +9,7 @@ structure! {
     DetectRequest {
         /// Minimum score of the returned detections; 0 for the node's setting.
         min_score: f64,
-        /// Maximum wait for a picture taken after the call; 0 for 5 s.
+        /// Maximum wait for a picture that arrives after the call; 0 for 5 s.
         timeout_secs: f64,
     }
 }
@@ -59,7 +59,7 @@ structure! {
     TeachResponse {
         /// Whether a model was taught.
         success: bool,
-        /// The reason for a failure.
+        /// The result, or the reason for a failure.
         message: String,
         /// Path of the grasp model.
         model_path: String,
@@ -83,13 +83,14 @@ structure! {
     GraspResponse {
         /// Whether the part is held; for a dry run, whether it can be grasped.
         success: bool,
-        /// The reason for a failure.
+        /// The result, or the reason for a failure.
         message: String,
         /// The last started step: detect, hover, approach, close, lift or hold.
         step: String,
-        /// The pose at which the hand closed.
+        /// The pose of the tool centre point at which the hand closes, in the base frame; zeros if no part was found.
         pose: PoseStamped,
-        /// Width between the fingers at the end, in metres.
+        /// Width between the fingers after closing, in metres; for a dry run, the expected width. 0 if the hand did not
+        /// close.
         closed_width_m: f64,
     }
 }

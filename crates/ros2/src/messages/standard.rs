@@ -51,9 +51,9 @@ structure! {
 structure! {
     /// `std_srvs/srv/Trigger_Response`.
     TriggerResponse {
-        /// Whether the action succeeded.
+        /// Whether the service succeeded.
         success: bool,
-        /// A description of the action, or the reason for its failure.
+        /// A description of the result, or the reason for the failure.
         message: String,
     }
 }
