@@ -23,7 +23,7 @@ const SAME_WITHIN_M: f64 = 0.015;
 pub struct LyingPart {
     /// The part's grasp as marked, base frame: x along the marked line, z down.
     pub base_from_part: Isometry3<f64>,
-    /// The known shape of the part.
+    /// The shape of the part, known or assumed.
     pub shape: PartShape,
 }
 

@@ -11,7 +11,7 @@ pub struct Place {
     pub name: String,
     /// Centre of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of the part's marked line, and of a tray's columns: about the vertical from the base's x, rad.
+    /// Direction of the part's marked line, and of a tray's x axis: about the vertical from the base's x, rad.
     pub yaw_rad: f64,
     /// z of the surface under the parts, base frame, m.
     pub surface_m: f64,
@@ -52,7 +52,7 @@ pub struct PlaceGoal {
     /// Inner size of a bin along the goal's x and y, m: the part may lie there in any pose. `None` if the pose of the
     /// goal is required.
     pub bin_m: Option<[f64; 2]>,
-    /// The neighbouring cells of a tray.
+    /// The neighbouring cells of a tray; `None` for a pose or a bin.
     pub tray: Option<TrayCell>,
 }
 

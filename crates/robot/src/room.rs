@@ -111,8 +111,8 @@ impl PlaceGoal {
         ))
     }
 
-    /// The poses of the hand at which its fingers, at this opening (m), have the most room among the surrounding parts;
-    /// empty if no pose has enough.
+    /// The poses of the hand at which its fingers, at this opening (m), keep a minimum distance from the surrounding
+    /// parts: the largest of three distances that any pose keeps. Empty if no pose keeps the smallest.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -155,7 +155,7 @@ impl PlaceGoal {
         let both = |step: u32| along.map(|is_longer| if is_longer { step } else { 0 });
         let (num, mut pitch_m) = (1..=MAX_STEPS).find_map(|step| Some((step, does(both(step))?)))?;
         if along == [true, true] {
-            // A larger pitch along one axis may be sufficient.
+            // Along one of the axes a smaller increase may be sufficient.
             let fewer = (0..num).find_map(|step| does([step, num]).or_else(|| does([num, step])));
             pitch_m = fewer.unwrap_or(pitch_m);
         }

@@ -55,11 +55,12 @@ pub enum Destination<'a> {
 pub struct Surroundings<'a> {
     /// Obstacles in the cell besides the table.
     pub obstacles: &'a [Obstacle],
-    /// Lying parts: fingers and the held part avoid them, and on straight paths fingers may move between them.
+    /// Lying parts. On free motions the arm and the held part avoid them. On straight paths they are made thinner, so
+    /// that fingers can move between them, and the held part may touch them.
     pub lying: &'a [LyingPart],
     /// The part in the hand, in the tcp's frame; empty without one.
     pub held: &'a [Capsule],
-    /// Opening of the hand on straight paths, m; elsewhere it may be fully open.
+    /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
     /// Minimum height above the table during the motion, m; less if start or destination is lower.
     pub table_clearance_m: f64,
@@ -160,8 +161,9 @@ impl<A: Arm> Robot<'_, A> {
     /// A path around the obstacles of the cell, whose motions satisfy the limits.
     ///
     /// # Errors
-    /// [`RobotError::NoWay`] with the blocking obstacle; [`RobotError::Planning`]; [`RobotError::Unsafe`] if every path
-    /// that was found violates a limit; the errors of [`Robot::commanded`].
+    /// [`RobotError::NoWay`] with the cause, such as the blocking obstacle; [`RobotError::Planning`];
+    /// [`RobotError::Unsafe`] if every path that was found violates a limit; [`RobotError::Device`] for invalid
+    /// obstacles; the errors of [`Robot::commanded`].
     pub fn plan_around(
         &mut self,
         surroundings: &Surroundings<'_>,

@@ -64,7 +64,7 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
-    /// Checks that all values are possible.
+    /// Checks speed, length, forces and time.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].

@@ -1,4 +1,4 @@
-//! Returns a difference between the robot's reference and the trajectory to zero along a quintic.
+//! Reduces a difference between the robot's reference and the trajectory to zero along a quintic.
 
 use std::ops::Sub;
 
@@ -7,8 +7,8 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// Duration of the shortest correction, s: ten times as long as the command losses for which it must converge. Longer
-/// corrections double this duration up to [`MAX_DOUBLINGS`] times.
+/// Duration of the shortest correction, s: ten times as long as the command losses after which corrections must
+/// converge. Longer corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
 /// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which
@@ -46,7 +46,7 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// Creates the shortest correction of a deviation that the limits allow.
+    /// Creates the shortest correction of a deviation within the limits; the longest one if there is none.
     pub(super) fn new(deviation: Deviation, limits: &Limits) -> Self {
         let lasting = |doublings| Self::lasting(&deviation, SHORTEST_SECS * 2_f64.powi(doublings));
         let longest = lasting(MAX_DOUBLINGS);
@@ -76,8 +76,8 @@ impl Correction {
         (c0 + c1 * u + c2 * (u * u)) * (1.0 - u).powi(3)
     }
 
-    /// Whether acceleration and jerk are small fractions of the limits; the initial values of a deviation cannot be
-    /// changed.
+    /// Whether acceleration and jerk are at most [`SHARE`] of the limits. An initial acceleration above that is allowed,
+    /// because it cannot be changed.
     fn keeps_to(&self, deviation: &Deviation, limits: &Limits) -> bool {
         let step = 1.0 / f64::from(NUM_SAMPLES);
         let step_secs = step * self.duration_secs;

@@ -70,12 +70,12 @@ impl HeightMeasurement {
 pub struct HeightReport {
     /// The height that the grasp uses.
     pub settled: Option<SettledHeight>,
-    /// The measured height: from the lines of sight to the part, and from the surface beside it if it was seen.
+    /// The measured height: from the lines of sight to the part, and from the surface beside it if that was measured.
     pub measured: Option<MeasuredHeight>,
     /// The height from the lines of sight alone.
     pub by_part: Option<MeasuredHeight>,
     /// The reason why nothing was triangulated.
     pub why_not: Option<String>,
-    /// The part in the pictures, in their order.
+    /// The part in the pictures, in the order of the pictures.
     pub sightings: Vec<Sighting>,
 }
