@@ -9,8 +9,8 @@
 //! robot adds it, also for the load that was given to it.
 //!
 //! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of
-//! 1 N·m causes an error of about 20 mm. In free air the integral compensates both; during contact it would press with increasing
-//! force, and is therefore frozen.
+//! 1 N·m causes an error of about 20 mm. In free air the integral compensates both; during contact it would press with
+//! increasing force, and is therefore frozen.
 //!
 //! # Source
 //! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as in

@@ -121,7 +121,8 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the slowest.
+    /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the
+    /// slowest.
     ///
     /// This is necessary because a path is timed at samples: between two samples a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
@@ -274,8 +275,8 @@ impl<'a, A: Arm> Robot<'a, A> {
 const TOUCH_SHARES: [f64; 3] = [0.05, 0.05, 0.02];
 
 impl<A: CompliantArm> Robot<'_, A> {
-    /// Moves straight down from the arm's position until a contact, or to the end of the path. The whole path is checked
-    /// first, with table and workspace lowered by [`TouchDown::below_table_m`].
+    /// Moves straight down from the arm's position until a contact, or to the end of the path. The whole path is
+    /// checked first, with table and workspace lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
     /// As for [`Robot::follow`]; [`RobotError::Configuration`] for a speed or a force that is not suitable for

@@ -76,8 +76,8 @@ impl Correction {
         (c0 + c1 * u + c2 * (u * u)) * (1.0 - u).powi(3)
     }
 
-    /// Whether acceleration and jerk are at most [`SHARE`] of the limits. An initial acceleration above that is allowed,
-    /// because it cannot be changed.
+    /// Whether acceleration and jerk are at most [`SHARE`] of the limits. An initial acceleration above that is
+    /// allowed, because it cannot be changed.
     fn keeps_to(&self, deviation: &Deviation, limits: &Limits) -> bool {
         let step = 1.0 / f64::from(NUM_SAMPLES);
         let step_secs = step * self.duration_secs;

@@ -113,7 +113,8 @@ impl<'a> Follower<'a> {
             self.correction = None;
         }
         let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
-        // The limits are relative to the reference. If the reported reference is impossible, the command is not limited.
+        // The limits are relative to the reference. If the reported reference is impossible, the command is not
+        // limited.
         let limited = match is_credible {
             true => JointVector::from(limit_joint_positions(self.limits, state, &wanted.into())),
             false => wanted,

@@ -93,7 +93,8 @@ impl CheckedMotion {
         self.trajectory.end()
     }
 
-    /// Positions (rad), velocities (rad/s) and accelerations (rad/s²) at a time; at rest before the start and after the end.
+    /// Positions (rad), velocities (rad/s) and accelerations (rad/s²) at a time; at rest before the start and after the
+    /// end.
     pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
         self.trajectory.sample(time_secs)
     }

@@ -79,8 +79,8 @@ mod tests {
         println!("{found}");
     }
 
-    /// Fewer than 30 % of the configurations in the joints' ranges are refused, and fewer than 17.5 % because of any one
-    /// pair of bodies: the capsules are small enough for all normal motions.
+    /// Fewer than 30 % of the configurations in the joints' ranges are refused, and fewer than 17.5 % because of any
+    /// one pair of bodies: the capsules are small enough for all normal motions.
     #[test]
     fn no_pair_is_always_refused() {
         let panda = ArmGeometry::panda();

@@ -107,8 +107,8 @@ pub struct PlacingReport {
 /// cells. This is checked before anything moves if [`GraspConfig::part`] is given, otherwise after the part was found.
 ///
 /// # Errors
-/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for impossible
-/// values of [`PlacingConfig::touch_down`].
+/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for
+/// impossible values of [`PlacingConfig::touch_down`].
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,

@@ -1,5 +1,5 @@
-//! A robot that loses commands. Like a Panda, it continues at constant acceleration without a command. The tests compare
-//! its reference with the limits, beyond which a Panda would end the motion.
+//! A robot that loses commands. Like a Panda, it continues at constant acceleration without a command. The tests
+//! compare its reference with the limits, beyond which a Panda would end the motion.
 
 use super::*;
 use crate::safety::{CheckedMotion, SafetyLimits};
