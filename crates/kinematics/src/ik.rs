@@ -23,7 +23,7 @@ pub struct IkOptions {
     pub comfortable_margin_rad: f64,
     /// Minimum distance of joint positions from their limits, rad.
     pub required_margin_rad: f64,
-    /// Number of angles of joint 7 that are tried, at least 2.
+    /// Number of angles of joint 7 that are tried in addition to those of seed and posture, at least 2.
     pub num_redundancy_samples: usize,
     /// Tolerance of the position, m.
     pub position_tolerance_m: f64,

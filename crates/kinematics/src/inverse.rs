@@ -239,7 +239,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The solution at `q`, refined if the closed form lost digits, if it is within the tolerances.
+    /// The solution at `q` if it is within the tolerances; if necessary, it is refined first, because the closed form
+    /// may lose digits.
     fn accept(&self, q: &JointVector) -> Option<IkSolution> {
         let solution = self.solution(q);
         if self.meets(&solution) {

@@ -296,7 +296,7 @@ fn check_in_range(what: &'static str, q: &JointVector, limits: &JointLimits) -> 
 const MIN_DISTANCE_RAD: f64 = 1e-12;
 /// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Cruising speeds that are tried on a path, as fractions of the speed that its most limiting joint allows.
+/// Cruising speeds that are tried on a path, as fractions of the speed that the most limiting joint or the tcp allows.
 const CRUISING_SPEED_SHARES: [f64; 4] = [1.0, 0.75, 0.55, 0.4];
 /// Margin between the maximum of the samples and the limit, for values between samples.
 const HEADROOM: f64 = 1.002;

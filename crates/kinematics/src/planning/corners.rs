@@ -7,7 +7,7 @@ use crate::rounded_path::{Corner, RoundedPath, length_secs};
 /// Factor between the sizes that are tried for a corner, down to the minimum. Below the minimum the arm stops instead.
 const SMALLER: f64 = 0.7;
 const MIN_SIZE_SECS: f64 = 2e-3;
-/// Minimum factor by which a found size could be increased for a further check.
+/// Minimum increase, as a factor of the known free size, for which a larger size is checked.
 const MIN_GROWTH: f64 = 1.15;
 
 /// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole. If

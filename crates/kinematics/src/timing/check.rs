@@ -68,7 +68,7 @@ impl Worst {
 
             let too_much = acceleration.max(torque_stretch.powi(2)).max(1.0);
             let is_by_path = share(&by_path, &joints.jerk_max) > share(&by_profile, &joints.jerk_max);
-            // If time is stretched by k, jerks are k³ lower, and ṡ² and s̈ are k² lower.
+            // If time is stretched by k, jerks are divided by k³, and ṡ² and s̈ by k².
             let (less, slower) = match jerk > 1.0 + TOLERANCE {
                 true if is_by_path => (jerk.powf(2.0 / 3.0), jerk.powf(2.0 / 3.0)),
                 true => (jerk, 1.0),

@@ -36,7 +36,7 @@ pub(crate) struct Timing {
     pub(crate) jerkless_secs: f64,
 }
 
-/// Maximum number of passes, including the first, without lowered limits; most motions need three or four.
+/// Maximum number of passes, including the first, which has no lowered limits; most motions need three or four.
 const MAX_PASSES: usize = 6;
 /// Limits violated by less than this fraction are left to the stretching.
 const TOLERANCE: f64 = 1e-3;
