@@ -229,7 +229,7 @@ impl Loop {
         }
     }
 
-    /// During a motion, waits for the answer to the last state; otherwise follows the clock.
+    /// During a motion, waits for the answer to the last state. Without a motion, waits for the clock if nothing moves.
     fn await_command(&mut self, max_wait: Duration) -> Option<RobotCommand> {
         self.serve_requests();
         let Some(has_started) = self.robot.expects_commands() else {
