@@ -254,8 +254,8 @@ mod tests {
     const FREE_AIR_N: f64 = 2.0;
     const MAX_CYCLES: usize = 10_000;
 
-    /// Descends with an arm that is held in place, so that once the reference moves, the external force is `pressed_n`
-    /// of the spring's own force, N.
+    /// Descends with an arm that is held in place. Once the reference moves, the external force is `pressed_n(f)` for
+    /// the force `f` of the spring, both in N.
     fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
         let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let mut descent = Descent::new(touch_down, &arm, q, still);

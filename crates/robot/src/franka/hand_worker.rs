@@ -53,7 +53,7 @@ impl HandWorker {
 
     /// Stops the fingers; a call that waits for them returns.
     pub(super) fn stop(&self) {
-        // A hand that cannot be reached does not move either.
+        // An error means that the hand is disconnected; this program cannot stop it then.
         let _ = self.stop.stop();
     }
 

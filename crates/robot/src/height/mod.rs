@@ -18,7 +18,7 @@ pub use settle::{GivenHeight, HeightSource, SettledHeight, settle};
 pub use sighting::Sighting;
 pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, triangulate, triangulate_nearest};
 
-/// How the height of a part is measured during the approach.
+/// How the height of a part is measured before the approach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeightMeasurement {
     /// Height of the camera above the table for both pictures, m.

@@ -41,8 +41,8 @@ pub struct GraspConfig {
     /// The poses at which pictures are taken, one after the other, until the part is found. The first must be
     /// reachable.
     pub look_outs: Vec<LookOut>,
-    /// Height of the wrist camera above the table for the second picture, m; best equal to that of the demonstration's
-    /// photo.
+    /// Height of the wrist camera above the table for pictures from above a detection, m; best equal to that of the
+    /// demonstration's photo.
     pub hover_height_m: f64,
     /// Force of each finger when closed, N.
     pub grasp_force_n: f64,

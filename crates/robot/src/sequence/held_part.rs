@@ -7,7 +7,7 @@ use super::config::GraspConfig;
 use crate::grasp_target::GraspTarget;
 use crate::part_shape::PartShape;
 
-/// The held part, since the hand closed.
+/// The part that the hand holds, as known when the hand closed.
 #[derive(Debug, Clone)]
 pub(super) struct HeldPart {
     /// Pose of the tcp in the frame of the part's grasp as it was detected: x along the marked line, z down.

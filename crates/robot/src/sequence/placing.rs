@@ -102,9 +102,10 @@ pub struct PlacingReport {
     pub errors: Vec<PlaceOffset>,
 }
 
-/// Grasps the part and puts it down, again if its offset is too large, see [`PlacingConfig::max_corrections`]. A cell
-/// of a tray must have room for the part and for the fingers that release it, with parts assumed in all neighbouring
-/// cells. This is checked before anything moves if [`GraspConfig::part`] is given, otherwise after the part was found.
+/// Grasps the part and puts it down; repeats this if its offset is too large, see [`PlacingConfig::max_corrections`]. A
+/// cell of a tray must have room for the part and for the fingers that release it, with parts assumed in all
+/// neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is given, otherwise after the
+/// part was found.
 ///
 /// # Errors
 /// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for

@@ -24,7 +24,7 @@ const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 const NARROW_MARGIN_M: f64 = 0.020;
 /// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// Largest height above the grasp at which a contact is the expected one with the table, m.
+/// Largest height above the grasp at which a contact does not fail the approach, m: the table's height is uncertain.
 const MAX_EARLY_M: f64 = 0.010;
 
 /// A path to above a grasp, with the straight descent to it.
