@@ -29,7 +29,8 @@ pub struct IkOptions {
     pub position_tolerance_m: f64,
     /// Tolerance of the orientation, rad.
     pub angle_tolerance_rad: f64,
-    /// Length in metres that counts as much as a radian in the search for the nearest pose of an unreachable one.
+    /// Length in metres that counts as much as a radian in the search for the reachable pose nearest to an unreachable
+    /// one.
     pub metres_per_rad: f64,
 }
 
