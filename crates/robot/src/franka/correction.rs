@@ -118,7 +118,7 @@ mod tests {
             let differences =
                 |values: &[f64]| values.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_SECS).collect::<Vec<f64>>();
             let accelerations = differences(&differences(&positions));
-            // A continuation of the previous motion: a difference of at most one cycle's jerk.
+            // The previous motion is continued: the acceleration changes by less than the jerk limit allows in a cycle.
             assert!((accelerations[0] - ddq).abs() < 1.5, "{} {ddq}", accelerations[0]);
             let hardest = accelerations.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
             assert!(hardest <= ddq.abs().max(0.3 * 7.5) + 1.0, "{hardest} for {q} {dq} {ddq}");
