@@ -47,7 +47,7 @@ pub struct ArmState {
     pub dq: JointVector,
     /// Commanded joint positions, rad: the controller's reference.
     pub q_commanded: JointVector,
-    /// Estimated external torques, Nm; zeros if the arm does not estimate them.
+    /// Estimated external torques, N·m; zeros if the arm does not estimate them.
     pub tau_external_nm: JointVector,
     /// Mode of the controller.
     pub mode: ArmMode,

@@ -332,7 +332,7 @@ impl RobotCore {
         self.waiting.push(outgoing(command_id, command, status));
     }
 
-    /// Sends the answers that waited until the arm was at rest.
+    /// Sends the waiting answers if the arm is at rest.
     fn send_waiting(&mut self) {
         let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
         if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {
