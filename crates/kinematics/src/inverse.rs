@@ -55,7 +55,7 @@ impl ArmGeometry {
 
     /// Finds the best configuration of each branch of the arm (elbow, shoulder, interval of joint 7), best first.
     ///
-    /// For a caller with further conditions, such as a straight path that starts there.
+    /// For a caller with further conditions, such as a straight path that starts at the configuration.
     ///
     /// # Errors
     /// The errors of [`ArmGeometry::inverse`]; the list is never empty.

@@ -215,7 +215,7 @@ impl Trajectory {
     }
 
     /// For a motion along a rounded path: its duration without a jerk limit, s. The other limits are satisfied at the
-    /// points of its grid.
+    /// points of the timing's grid.
     pub fn without_jerk_limit_secs(&self) -> Option<f64> {
         match &self.motion {
             Motion::AlongRoundedPath(timed) => Some(timed.1.jerkless_secs),

@@ -24,8 +24,8 @@ pub struct PartShape {
 }
 
 impl PartShape {
-    /// A part from points of its outline in the grasp's frame, whose convex hull is used, the width between the
-    /// fingers, and the heights of top and grasp above the surface under the part; all in m.
+    /// A part with the convex hull of outline points in the grasp's frame, the width between the fingers, and the
+    /// heights of top and grasp above the surface under the part; all in m.
     ///
     /// # Errors
     /// [`RobotError::Configuration`] for a length that is not above 0 and at most 1 m, for an outline without an area,

@@ -38,8 +38,8 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
     split_at_stops(&waypoints, &sizes)
 }
 
-/// The largest size up to `room`, among those tried, for which the corner is free; at least `known_free`; 0 if there is
-/// none.
+/// The largest of the tried sizes up to `room` for which the corner is free; otherwise `known_free`, which is 0 if no
+/// size is known to be free.
 fn largest_free(checker: &mut Checker<'_>, corner: &Corner, room: f64, known_free: f64) -> f64 {
     let mut size = room;
     while size > (known_free * MIN_GROWTH).max(MIN_SIZE_SECS) {

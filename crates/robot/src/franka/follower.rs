@@ -31,7 +31,7 @@ const ARRIVED_RAD: f64 = 1e-5;
 const MAX_DEVIATION_RAD: f64 = 0.1;
 /// A robot that sent no state for longer than this, ms, has left the motion.
 const MAX_ELAPSED_MS: u64 = 1000;
-/// Number of cycles after the trajectory's end after which a motion is finished at any reported reference.
+/// A motion is finished at the latest this number of cycles after the end of the trajectory.
 const MAX_CYCLES_AFTER_END: u32 = 2000;
 
 /// A motion's next command.

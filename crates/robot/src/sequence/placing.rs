@@ -335,8 +335,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Maximum number of orientations, equal by the part's symmetry, that are tried for a picture: the one in which the
-/// hand released the part may be out of reach at the height of the picture.
+/// Maximum number of orientations, equivalent by the part's symmetry, that are tried for a picture: the orientation in
+/// which the hand released the part may be out of reach at the height of the picture.
 const MAX_VIEW_TURNS: usize = 4;
 /// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;
