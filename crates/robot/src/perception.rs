@@ -73,7 +73,7 @@ pub enum GraspStep {
     Hold,
     /// The arm carries the part to above its place.
     Carry,
-    /// The hand descends with the part until it measures contact with the place.
+    /// The hand descends with the part until a contact with the place is measured.
     PutDown,
     /// The fingers open and the hand moves up.
     Release,

@@ -17,7 +17,7 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// A descent until a contact, which is assumed at its expected place.
+    /// A descent until a contact, which is assumed at its expected height.
     Down {
         /// Joint positions at the contact, rad.
         end: JointVector,

@@ -56,7 +56,7 @@ impl PlaceGoal {
     /// fingers that open `release_margin_m` wider than the part (m).
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] without that room; it says what has no room, and which pitch is sufficient.
+    /// [`RobotError::Configuration`] without that room; the error contains the reason and a sufficient pitch.
     pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
         let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
         let turns_rad = same_turns_rad(symmetry);
@@ -78,7 +78,7 @@ impl PlaceGoal {
         Err(RobotError::Configuration { what: format!("\"{}\"", self.name), expected, found })
     }
 
-    /// Says what has no room; `None` if there is enough.
+    /// The reason why there is not enough room; `None` if there is enough.
     fn lacks_room(&self, part: &PartShape, turns_rad: &[f64], opening_m: f64) -> Option<String> {
         let base_from_part = self.base_from_part(0.0, 0.0);
         let own = part.outline_in_base(&base_from_part);

@@ -16,7 +16,8 @@ pub(crate) const TABLE: &str = "table";
 const NUM_SEEDS: u64 = 5;
 /// Maximum number of collision checks of a search: about one second, and ten times as many as difficult paths need.
 const MAX_CHECKS: usize = 50_000;
-/// Distance from the table that is left to start and destination, in addition to the planner's margin, m.
+/// Distance between the raised table and the lowest point at start and destination, in addition to the planner's
+/// margin, m.
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;

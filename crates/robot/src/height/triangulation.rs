@@ -68,7 +68,7 @@ pub enum HeightError {
     /// The two lines of sight have nearly the same direction.
     #[error("expected lines of sight whose slopes differ by {MIN_SLOPE_DIFFERENCE} or more, found {difference:.3}")]
     Parallel { difference: f64 },
-    /// The lines of sight cross above a camera or too close below it, or a sighting's plane is there.
+    /// The lines of sight cross above a camera or too close below it, or the plane of a sighting is too high.
     #[error(
         "expected a part at least {:.0} mm below the camera, which is {:.0} mm high, found lines of sight that cross at {:.0} mm",
         MIN_DISTANCE_M * 1e3,

@@ -69,7 +69,8 @@ pub enum GraspOutcome {
 pub struct GraspReport {
     /// The outcome.
     pub outcome: GraspOutcome,
-    /// The accepted detection of each picture; last, the target at the part's height, if that was to be measured.
+    /// The accepted detection of each picture; last, the target at the part's height, if this height was to be
+    /// measured.
     pub targets: Vec<Option<GraspTarget>>,
     /// Numbers of pictures: from look-out poses, and from above the first detection.
     pub looks: [usize; 2],
