@@ -273,8 +273,7 @@ impl Trajectory {
     }
 }
 
-/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`; these belong to a profile that is
-/// stretched in time.
+/// The state at a point of a path, for `ds/dt` and `d²s/dt²` of a profile that is stretched in time by a factor.
 fn at_progress(point: &PathPoint, velocity: f64, acceleration: f64, stretch: f64) -> State {
     let (velocity, acceleration) = (velocity / stretch, acceleration / stretch.powi(2));
     (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))

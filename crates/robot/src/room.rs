@@ -111,8 +111,8 @@ impl PlaceGoal {
         ))
     }
 
-    /// The poses of the hand at which its fingers, at this opening (m), keep a minimum distance from the surrounding
-    /// parts: the largest of three distances that any pose keeps. Empty if no pose keeps the smallest.
+    /// Tries three minimum distances between the fingers, at this opening (m), and the surrounding parts, the largest
+    /// first. Returns the poses of the hand that keep the first distance that any pose keeps; empty if there is none.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,

@@ -13,8 +13,8 @@ use crate::arm_state::PERIOD_SECS;
 use crate::error::{Result, RobotError};
 use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 
-/// Time during which the arm stands still to measure the forces in free air, s, and averaging time of force and height
-/// at the end.
+/// Time during which the arm stands still to measure the forces in free air, and over which force and height are
+/// averaged at the end, s.
 const STANDING_SECS: f64 = 0.2;
 /// Time within which the reference reaches its speed, s.
 const RAMP_SECS: f64 = 0.5;
