@@ -113,7 +113,7 @@ impl Hand {
         self.execute(&HandRequest::Grasp { width, epsilon_inner, epsilon_outer, speed, force })
     }
 
-    /// Stops the fingers and releases the part.
+    /// Stops the fingers and ends a grasp.
     ///
     /// # Errors
     /// As for [`Hand::homing`].

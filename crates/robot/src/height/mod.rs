@@ -39,8 +39,8 @@ impl HeightMeasurement {
     /// Largest height of the camera above the table for both pictures, m.
     pub const MAX_CAMERA_HEIGHT_M: f64 = 0.30;
 
-    /// A measurement with two pictures from 0.3 m above the table, 0.12 m apart, of a part with these heights of marks
-    /// and grasp above the surface under it, m.
+    /// A measurement with two pictures from 0.3 m above the table, 0.12 m apart. `mark_height_m` and `grasp_height_m`
+    /// are above the surface under the part.
     pub fn new(mark_height_m: f64, grasp_height_m: f64) -> Self {
         Self {
             camera_height_m: Self::MAX_CAMERA_HEIGHT_M,
