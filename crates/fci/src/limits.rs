@@ -96,7 +96,7 @@ impl Limits {
         elbow: RateLimits { velocity: 1.5, acceleration: 10.0, jerk: 5000.0 },
     };
 
-    /// The limits of the robot model that uses a version of the protocol.
+    /// The limits of the robot model that uses this version of the protocol.
     pub fn of(version: Version) -> &'static Limits {
         match version {
             Version::V5 => &Self::PANDA,

@@ -3,8 +3,8 @@
 //!
 //! With q7 fixed the arm has six joints and at most eight solutions. Seen from the flange, joint 7 determines the wrist
 //! centre W (the common origin of links 5 and 6) and the axis of joint 6. Shoulder S, elbow axis E and W then form a
-//! triangle of known sides: its angle at E is q4 (two solutions). The triangle may rotate about SW by ψ; the forearm
-//! must be perpendicular to the axis of joint 6, which allows two values of ψ. Shoulder (ZYZ Euler angles, two
+//! triangle of known sides: its angle at E determines q4 (two solutions). The triangle may rotate about SW by ψ; the
+//! forearm must be perpendicular to the axis of joint 6, which allows two values of ψ. Shoulder (ZYZ Euler angles, two
 //! solutions) and wrist follow from the frames.
 //!
 //! Only the geometry is considered: solutions may violate joint limits. If no solution exists, the nearest degenerate
@@ -31,7 +31,7 @@ pub(crate) struct AnalyticSolution {
 /// The solutions for one q7, by branch; `None` if the construction is degenerate.
 ///
 /// `q1_if_free` is used if the upper arm points along the axis of joint 1, where only q1 + q3 is determined. Joint 6,
-/// whose range is not centred at 0, is returned in [-π + 1.87, π + 1.87), centred on the middle of its range.
+/// whose range is not centred at 0, is returned in [-π + 1.87, π + 1.87), centred on the middle of the Panda's range.
 pub(crate) fn analytic_solutions(
     arm: &ArmGeometry,
     base_from_flange: &Isometry3<f64>,
@@ -129,9 +129,10 @@ pub(crate) fn analytic_solutions(
     found
 }
 
-/// Middle of joint 6's range, rad.
+/// Middle of the Panda's range of joint 6, rad.
 const MIDDLE_Q6: f64 = 1.8675;
-/// Below these values the construction has no defined direction; a neighbouring q7 has one.
+/// Below these values a direction of the construction is not defined. Below the first two there is no solution; a
+/// neighbouring q7 has one.
 const MIN_REACH_M: f64 = 1e-6;
 const MIN_AMPLITUDE: f64 = 1e-9;
 const MIN_SIN_Q2: f64 = 1e-9;

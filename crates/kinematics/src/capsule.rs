@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn distances_that_can_be_computed_by_hand() {
         let along_x = Capsule::new([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 0.1);
-        // Crossing above, beside the end, parallel, touching, and a sphere.
+        // Crossing above, beside the end, parallel, overlapping, and a sphere.
         for (other, expected) in [
             (Capsule::new([0.5, -1.0, 0.5], [0.5, 1.0, 0.5], 0.2), 0.2),
             (Capsule::new([1.3, 0.4, 0.0], [2.0, 0.4, 0.0], 0.1), 0.3),

@@ -23,13 +23,14 @@ pub struct IkOptions {
     pub comfortable_margin_rad: f64,
     /// Minimum distance of joint positions from their limits, rad.
     pub required_margin_rad: f64,
-    /// Number of angles of joint 7 that are tried, at least 2.
+    /// Number of angles of joint 7 that are tried in addition to those of seed and posture, at least 2.
     pub num_redundancy_samples: usize,
     /// Tolerance of the position, m.
     pub position_tolerance_m: f64,
     /// Tolerance of the orientation, rad.
     pub angle_tolerance_rad: f64,
-    /// Length in metres that counts as much as a radian in the search for the nearest pose of an unreachable one.
+    /// Length in metres that counts as much as a radian in the search for the reachable pose nearest to an unreachable
+    /// one.
     pub metres_per_rad: f64,
 }
 

@@ -55,7 +55,7 @@ impl ArmGeometry {
 
     /// Finds the best configuration of each branch of the arm (elbow, shoulder, interval of joint 7), best first.
     ///
-    /// For a caller with further conditions, such as a straight path that starts there.
+    /// For a caller with further conditions, such as a straight path that starts at the configuration.
     ///
     /// # Errors
     /// The errors of [`ArmGeometry::inverse`]; the list is never empty.
@@ -239,7 +239,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The solution at `q`, refined if the closed form lost digits, if it is within the tolerances.
+    /// The solution at `q` if it is within the tolerances; if necessary, it is refined first, because the closed form
+    /// may lose digits.
     fn accept(&self, q: &JointVector) -> Option<IkSolution> {
         let solution = self.solution(q);
         if self.meets(&solution) {

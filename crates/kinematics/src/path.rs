@@ -37,7 +37,7 @@ impl Default for LineOptions {
 }
 
 /// A point of a path: the configuration and its derivatives with respect to the path's parameter `s`. On a
-/// [`JointPath`] `s` is in m, as in the units below; on a [`crate::RoundedPath`] it is in s.
+/// [`JointPath`] `s` is in metres, as in the units below; on a [`crate::RoundedPath`] `s` is in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
     /// Joint positions, rad.

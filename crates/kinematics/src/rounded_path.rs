@@ -173,8 +173,8 @@ mod tests {
         (end[0], end[1]) = (2.175, 2.175);
         let path = RoundedPath::new(&[zero, middle, end], &[0.5]);
         assert!((path.length_secs() - 2.0).abs() < 1e-12);
-        // At the middle x = 1/2, the change of direction so far is 1 s · (1/4) (3/4) = 3/16, of which joint 2 has
-        // 0.09375 s; joint 1 lacks as much.
+        // At the middle of the corner, x = 1/2 and 0.5 s after its start, joint 2 has moved as in 0.5 s · (1/4) · (3/4)
+        // = 0.09375 s at full speed; joint 1 lacks as much.
         let half = path.at(1.0);
         assert!((half.q[0] - 2.175 * (1.0 - 0.09375)).abs() < 1e-12, "{}", half.q);
         assert!((half.q[1] - 2.175 * 0.09375).abs() < 1e-12, "{}", half.q);

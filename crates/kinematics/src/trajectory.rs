@@ -215,7 +215,7 @@ impl Trajectory {
     }
 
     /// For a motion along a rounded path: its duration without a jerk limit, s. The other limits are satisfied at the
-    /// points of its grid.
+    /// points of the timing's grid.
     pub fn without_jerk_limit_secs(&self) -> Option<f64> {
         match &self.motion {
             Motion::AlongRoundedPath(timed) => Some(timed.1.jerkless_secs),
@@ -273,8 +273,7 @@ impl Trajectory {
     }
 }
 
-/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`; these belong to a profile that is
-/// stretched in time.
+/// The state at a point of a path, for `ds/dt` and `d²s/dt²` of a profile that is stretched in time by a factor.
 fn at_progress(point: &PathPoint, velocity: f64, acceleration: f64, stretch: f64) -> State {
     let (velocity, acceleration) = (velocity / stretch, acceleration / stretch.powi(2));
     (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
@@ -296,7 +295,7 @@ fn check_in_range(what: &'static str, q: &JointVector, limits: &JointLimits) -> 
 const MIN_DISTANCE_RAD: f64 = 1e-12;
 /// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Cruising speeds that are tried on a path, as fractions of the speed that its most limiting joint allows.
+/// Cruising speeds that are tried on a path, as fractions of the speed that the most limiting joint or the tcp allows.
 const CRUISING_SPEED_SHARES: [f64; 4] = [1.0, 0.75, 0.55, 0.4];
 /// Margin between the maximum of the samples and the limit, for values between samples.
 const HEADROOM: f64 = 1.002;

@@ -79,8 +79,8 @@ pub trait Arm {
 
 /// An arm that accepts torques and can therefore be compliant.
 pub trait CompliantArm: Arm {
-    /// Moves straight down from the arm's position until it measures a contact, presses on it, and stops; `watch`
-    /// receives every state.
+    /// Moves straight down from the arm's position until the arm measures a contact, or to the end of the path. Presses
+    /// on the touched surface and stops; `watch` receives every state.
     ///
     /// # Errors
     /// As for [`Arm::follow`].

@@ -2,7 +2,7 @@
 
 use sdg_kinematics::JointVector;
 
-/// Time between two commands of an arm that is driven cycle by cycle, in seconds: 1 kHz.
+/// Time between two commands of an arm that gets a command in every cycle (1 kHz), s.
 pub const PERIOD_SECS: f64 = 1e-3;
 
 /// Mode of the arm's controller.
@@ -47,7 +47,7 @@ pub struct ArmState {
     pub dq: JointVector,
     /// Commanded joint positions, rad: the controller's reference.
     pub q_commanded: JointVector,
-    /// Estimated external torques, Nm; zeros if the arm does not estimate them.
+    /// Estimated external torques, N·m; zeros if the arm does not estimate them.
     pub tau_external_nm: JointVector,
     /// Mode of the controller.
     pub mode: ArmMode,
@@ -87,7 +87,7 @@ pub enum HandCommand {
 
 /// Tolerances below (first) and above (second) the commanded width of a part, m. The tolerances are wide because a
 /// width measured in a picture is accurate to a few millimetres only, and a round part may be gripped beside its
-/// thickest place, but narrow enough to detect a hand that closed without a part.
+/// thickest point. They are narrow enough to detect a hand that closed without a part.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
@@ -111,7 +111,7 @@ impl Load {
 pub enum ContactSensitivity {
     /// In free motion, where nothing may touch the arm: low thresholds.
     Free,
-    /// Near the part and with it, where the table and the part exert forces.
+    /// On straight motions near the table, where the table and the part exert forces.
     Contact,
 }
 

@@ -4,13 +4,13 @@
 //! τ = Jᵀ (-K e - ∫ k_i K e dt - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
 //!     └ spring, its integral and damper of the tcp   └ spring of the elbow, without moving the tcp
 //! ```
-//! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and half of a
-//! rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
+//! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and about half of
+//! the rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
 //! robot adds it, also for the load that was given to it.
 //!
-//! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of 1
-//! Nm costs about 20 mm. In free air the integral compensates both; during contact it would press with increasing
-//! force, and is therefore frozen.
+//! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of
+//! 1 N·m causes an error of about 20 mm. In free air the integral compensates both; during contact it would press with
+//! increasing force, and is therefore frozen.
 //!
 //! # Source
 //! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as in
@@ -36,7 +36,7 @@ pub struct Impedance {
     pub integral_per_sec: Vector6<f64>,
     /// Stiffness of the elbow about its configuration at the start, N·m/rad.
     pub null_stiffness: f64,
-    /// Largest change of a joint's torque per cycle, N·m; the robot stops at a larger one.
+    /// Largest change of a joint's torque per cycle, N·m; the robot stops above 1 N·m.
     pub max_torque_step_nm: f64,
 }
 
@@ -50,7 +50,7 @@ impl Impedance {
         max_torque_step_nm: 0.9,
     };
     /// Stiff in all directions, with integral action: for free air. The damping is for the arm's own mass at the tcp,
-    /// about 5 kg; without it integral action makes the tcp oscillate.
+    /// about 5 kg; with less damping, integral action makes the tcp oscillate.
     pub const FREE_AIR: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 1000.0, 50.0, 50.0, 50.0),
         mass: Vector6::new(5.0, 5.0, 5.0, 1.0, 1.0, 1.0),
@@ -121,8 +121,8 @@ impl ImpedanceControl {
         let force = -spring - self.integral - damping.component_mul(&(jacobian * dq - reference.twist));
         let wanted_null = (self.q_null - q) * null_stiffness - dq * (2.0 * null_stiffness.sqrt());
         let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
-        // Removes the part of the elbow's torque that would press with the tcp; the sum is positive definite, so that a
-        // factor exists.
+        // The force with which the elbow's torque would press at the tcp; it is subtracted below. `square` is positive
+        // definite, so that its Cholesky factor exists.
         let pressing = square.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(&(jacobian * wanted_null)));
         let wanted = jacobian.transpose() * (force - pressing) + wanted_null + coriolis;
         self.torque = JointVector::from_fn(|joint, _| {

@@ -1,4 +1,4 @@
-//! Perception for an arm that does not move: the part is at its known place for any pose of the arm.
+//! Perception for a planned arm: the part has the same known pose for every pose of the arm.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -36,7 +36,7 @@ impl PartFinder<PlannedArm> for KnownTarget {
         Ok(self.target)
     }
 
-    /// Returns the intended place: a part that was put down is assumed to lie there.
+    /// Returns the intended pose: a part that was put down is assumed to lie there.
     fn find_nearest(&mut self, _arm: &mut PlannedArm, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         Ok(self.target.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
     }

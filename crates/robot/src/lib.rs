@@ -6,7 +6,8 @@
 //!                                                                                     Watch ◄─ ArmState ─┘
 //! ```
 //! [`Arm`] is implemented by [`FrankaArm`], by [`PlannedArm`] for dry runs, and in the crates `simulation` and `ros2`.
-//! A motion reaches an arm only as a [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
+//! A motion reaches an arm only as a [`CheckedMotion`], except a compliant descent, whose path is checked before it
+//! starts. After an error during a motion nothing moves until [`Robot::recover`].
 //!
 //! [`grasp_and_place`] continues to a [`PlaceGoal`]; [`Robot::plan_around`] finds paths around the obstacles of the
 //! cell.

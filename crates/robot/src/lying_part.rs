@@ -9,9 +9,9 @@ use crate::room::{MIN_FINGER_ROOM_M, gap_m};
 
 /// Distance by which the capsules of the finger tips extend beyond the finger tips along their motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
-/// Distance by which parts are made thinner on straight paths, which lead fingers between parts, m: the excess of the
-/// capsules, plus the difference between the planner's margin (3 mm) and the room that fingers must have in a tray
-/// (1 mm).
+/// Distance by which each side of a part is moved inwards on straight paths, m, so that fingers can move between parts:
+/// the excess of the capsules, plus the difference between the planner's margin (3 mm) and the room that fingers must
+/// have in a tray (1 mm).
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
 /// Minimum half width or radius of the solid that stands for a part, m.
 const MIN_HALF_M: f64 = 0.0005;
@@ -23,7 +23,7 @@ const SAME_WITHIN_M: f64 = 0.015;
 pub struct LyingPart {
     /// The part's grasp as marked, base frame: x along the marked line, z down.
     pub base_from_part: Isometry3<f64>,
-    /// The known shape of the part.
+    /// The shape of the part, known or assumed.
     pub shape: PartShape,
 }
 
@@ -77,7 +77,7 @@ impl LyingPart {
     }
 }
 
-/// Lying parts, without duplicates: of several at one place only the latest is kept.
+/// Lying parts, without duplicates: of several at one position only the latest is kept.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LyingParts(Vec<LyingPart>);
 

@@ -24,12 +24,12 @@ pub struct PartShape {
 }
 
 impl PartShape {
-    /// A part from points of its outline in the grasp's frame, whose convex hull is used, the width between the
-    /// fingers, and the heights of top and grasp above the surface under the part; all in m.
+    /// A part with the convex hull of outline points in the grasp's frame, the width between the fingers, and the
+    /// heights of top and grasp above the surface under the part; all in m.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for numbers that are not finite, for an outline without an area, and for one that
-    /// extends more than a metre from its grasp.
+    /// [`RobotError::Configuration`] for a length that is not above 0 and at most 1 m, for an outline without an area,
+    /// and for one that extends more than a metre from its grasp or is not finite.
     pub fn new(
         outline: impl IntoIterator<Item = Point2<f64>>,
         jaw_width_m: f64,

@@ -73,7 +73,7 @@ pub enum GraspStep {
     Hold,
     /// The arm carries the part to above its place.
     Carry,
-    /// The hand descends with the part until it measures contact with the place.
+    /// The hand descends with the part until a contact with the place is measured.
     PutDown,
     /// The fingers open and the hand moves up.
     Release,
@@ -124,7 +124,7 @@ impl fmt::Display for GraspStep {
 
 /// Observes the steps. An observer may know more than the arm: a simulation knows the part's true pose.
 pub trait StepObserver<A: Arm> {
-    /// Called before a step.
+    /// Called before [`GraspStep::Hold`], not before other steps.
     ///
     /// # Errors
     /// An error ends the sequence.
@@ -132,7 +132,9 @@ pub trait StepObserver<A: Arm> {
         Ok(())
     }
 
-    /// Called after a step, before the hand is read; returns the reason if the step failed.
+    /// Called after each step except [`GraspStep::Hover`], [`GraspStep::Approach`] and [`GraspStep::Check`], and after
+    /// [`GraspStep::Detect`] only if the part's height was to be measured. Returns the reason if the step failed; this
+    /// verdict has priority over that of the hand.
     ///
     /// # Errors
     /// An error ends the sequence.

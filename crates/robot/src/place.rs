@@ -9,9 +9,9 @@ use crate::error::{Result, RobotError};
 pub struct Place {
     /// The name in the workcell file.
     pub name: String,
-    /// Centre of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
+    /// x and y of the pose, of the bin's centre or of the centre of the tray's first cell, base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of the part's marked line, and of a tray's columns: about the vertical from the base's x, rad.
+    /// Direction of the part's marked line, and of a tray's x axis: about the vertical from the base's x, rad.
     pub yaw_rad: f64,
     /// z of the surface under the parts, base frame, m.
     pub surface_m: f64,
@@ -52,7 +52,7 @@ pub struct PlaceGoal {
     /// Inner size of a bin along the goal's x and y, m: the part may lie there in any pose. `None` if the pose of the
     /// goal is required.
     pub bin_m: Option<[f64; 2]>,
-    /// The neighbouring cells of a tray.
+    /// The neighbouring cells of a tray; `None` for a pose or a bin.
     pub tray: Option<TrayCell>,
 }
 
@@ -70,7 +70,7 @@ pub struct TrayCell {
 pub struct PlaceOffset {
     /// Offset along the marked line and across it, m.
     pub beside_m: [f64; 2],
-    /// Angle between part and goal, up to the part's symmetry, rad.
+    /// Angle between part and goal, reduced by the part's symmetry, rad.
     pub angle_rad: f64,
 }
 

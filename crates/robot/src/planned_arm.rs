@@ -1,4 +1,4 @@
-//! An arm that does not move: it records a sequence before it is executed.
+//! An arm that does not move and only records the commands of a sequence.
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
@@ -17,7 +17,7 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// A descent until a contact, which is assumed at its expected place.
+    /// A descent until a contact, which is assumed at its expected height.
     Down {
         /// Joint positions at the contact, rad.
         end: JointVector,
@@ -57,7 +57,7 @@ impl PlannedArm {
         self.state.time_secs
     }
 
-    /// Joint positions (rad) and opening of the hand (m) at regular times, the first at the start.
+    /// Joint positions (rad) and opening of the hand (m) at regular times from the start, and once more at the end.
     pub fn frames(
         start: &JointVector,
         opening_m: f64,
@@ -157,7 +157,7 @@ impl Arm for PlannedArm {
 }
 
 impl CompliantArm for PlannedArm {
-    /// Assumes the contact at its expected place: above the last part of the path, which allows for an uncertain height.
+    /// Assumes the contact at its expected height: [`TouchDown::below_table_m`] above the end of the path.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
         let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
         let mut base_from_tcp = self.geometry.forward(&self.state.q);

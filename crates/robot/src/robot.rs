@@ -16,13 +16,13 @@ use crate::watch::{StopReason, Watch};
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 /// Maximum number of times that a motion is slowed down until joints and tcp keep their limits.
 const MAX_SLOWDOWNS: usize = 8;
-/// Factor of the speed each time.
+/// Factor of velocity, acceleration and jerk at each slowdown.
 const SLOWDOWN: f64 = 0.8;
 
 /// An arm, the limits of its motions, and whether it may move.
 ///
-/// After an error in motion nothing moves any more, neither arm nor hand, until [`Robot::recover`] is called, which a
-/// program does only at a person's request.
+/// After an error in motion nothing moves any more, neither arm nor hand, until [`Robot::recover`] is called. A program
+/// calls it only at a person's request.
 #[derive(Debug)]
 pub struct Robot<'a, A: Arm> {
     arm: &'a mut A,
@@ -31,7 +31,7 @@ pub struct Robot<'a, A: Arm> {
     latched: Option<String>,
     /// The load that was given to the hand.
     load: Load,
-    /// The place of the hand's last contact, until the hand has moved up from there.
+    /// The last compliant descent, until the next motion has ended without an error.
     felt_below: Option<FeltBelow>,
 }
 
@@ -121,7 +121,8 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the slowest.
+    /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the
+    /// slowest.
     ///
     /// This is necessary because a path is timed at samples: between two samples a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
@@ -274,8 +275,8 @@ impl<'a, A: Arm> Robot<'a, A> {
 const TOUCH_SHARES: [f64; 3] = [0.05, 0.05, 0.02];
 
 impl<A: CompliantArm> Robot<'_, A> {
-    /// Moves straight down from the arm's position until a contact. The whole path is checked first, with the table
-    /// lowered by [`TouchDown::below_table_m`].
+    /// Moves straight down from the arm's position until a contact, or to the end of the path. The whole path is
+    /// checked first, with table and workspace lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
     /// As for [`Robot::follow`]; [`RobotError::Configuration`] for a speed or a force that is not suitable for

@@ -25,7 +25,7 @@ impl RobotAddress {
     /// The error for a device at this address, such as `robot` or `hand`, that does not accept connections.
     pub(crate) fn refused(&self, device: &str, error: FciError) -> RobotError {
         match error {
-            // The error for a device that was reached and reports why it cannot be driven.
+            // The device was reached and uses another version of the protocol.
             FciError::Version { .. } => RobotError::Device(Box::new(error)),
             error => RobotError::Unreachable { peer: format!("the {device} at {self}"), why: error.to_string() },
         }

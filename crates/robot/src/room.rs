@@ -56,7 +56,7 @@ impl PlaceGoal {
     /// fingers that open `release_margin_m` wider than the part (m).
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] without that room; it says what has no room, and which pitch is sufficient.
+    /// [`RobotError::Configuration`] without that room; the error contains the reason and a sufficient pitch.
     pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
         let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
         let turns_rad = same_turns_rad(symmetry);
@@ -78,7 +78,7 @@ impl PlaceGoal {
         Err(RobotError::Configuration { what: format!("\"{}\"", self.name), expected, found })
     }
 
-    /// Says what has no room; `None` if there is enough.
+    /// The reason why there is not enough room; `None` if there is enough.
     fn lacks_room(&self, part: &PartShape, turns_rad: &[f64], opening_m: f64) -> Option<String> {
         let base_from_part = self.base_from_part(0.0, 0.0);
         let own = part.outline_in_base(&base_from_part);
@@ -111,8 +111,8 @@ impl PlaceGoal {
         ))
     }
 
-    /// The poses of the hand at which its fingers, at this opening (m), have the most room among the surrounding parts;
-    /// empty if no pose has enough.
+    /// Tries three minimum distances between the fingers, at this opening (m), and the surrounding parts, the largest
+    /// first. Returns the poses of the hand that keep the first distance that any pose keeps; empty if there is none.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -155,7 +155,7 @@ impl PlaceGoal {
         let both = |step: u32| along.map(|is_longer| if is_longer { step } else { 0 });
         let (num, mut pitch_m) = (1..=MAX_STEPS).find_map(|step| Some((step, does(both(step))?)))?;
         if along == [true, true] {
-            // A larger pitch along one axis may be sufficient.
+            // Along one of the axes a smaller increase may be sufficient.
             let fewer = (0..num).find_map(|step| does([step, num]).or_else(|| does([num, step])));
             pitch_m = fewer.unwrap_or(pitch_m);
         }

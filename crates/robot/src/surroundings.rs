@@ -16,7 +16,8 @@ pub(crate) const TABLE: &str = "table";
 const NUM_SEEDS: u64 = 5;
 /// Maximum number of collision checks of a search: about one second, and ten times as many as difficult paths need.
 const MAX_CHECKS: usize = 50_000;
-/// Distance from the table that is left to start and destination, in addition to the planner's margin, m.
+/// Distance between the raised table and the lowest point at start and destination, in addition to the planner's
+/// margin, m.
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
@@ -55,11 +56,12 @@ pub enum Destination<'a> {
 pub struct Surroundings<'a> {
     /// Obstacles in the cell besides the table.
     pub obstacles: &'a [Obstacle],
-    /// Lying parts: fingers and the held part avoid them, and on straight paths fingers may move between them.
+    /// Lying parts. On free motions the arm and the held part avoid them. On straight paths they are made thinner, so
+    /// that fingers can move between them, and the held part may touch them.
     pub lying: &'a [LyingPart],
     /// The part in the hand, in the tcp's frame; empty without one.
     pub held: &'a [Capsule],
-    /// Opening of the hand on straight paths, m; elsewhere it may be fully open.
+    /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
     /// Minimum height above the table during the motion, m; less if start or destination is lower.
     pub table_clearance_m: f64,
@@ -160,8 +162,9 @@ impl<A: Arm> Robot<'_, A> {
     /// A path around the obstacles of the cell, whose motions satisfy the limits.
     ///
     /// # Errors
-    /// [`RobotError::NoWay`] with the blocking obstacle; [`RobotError::Planning`]; [`RobotError::Unsafe`] if every path
-    /// that was found violates a limit; the errors of [`Robot::commanded`].
+    /// [`RobotError::NoWay`] with the cause, such as the blocking obstacle; [`RobotError::Planning`];
+    /// [`RobotError::Unsafe`] if every path that was found violates a limit; [`RobotError::Device`] for invalid
+    /// obstacles; the errors of [`Robot::commanded`].
     pub fn plan_around(
         &mut self,
         surroundings: &Surroundings<'_>,

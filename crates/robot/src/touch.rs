@@ -13,8 +13,8 @@ use crate::arm_state::PERIOD_SECS;
 use crate::error::{Result, RobotError};
 use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 
-/// Time during which the arm stands still to measure the forces in free air, s, and averaging time of force and height
-/// at the end.
+/// Time during which the arm stands still to measure the forces in free air, and over which force and height are
+/// averaged at the end, s.
 const STANDING_SECS: f64 = 0.2;
 /// Time within which the reference reaches its speed, s.
 const RAMP_SECS: f64 = 0.5;
@@ -64,7 +64,7 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
-    /// Checks that all values are possible.
+    /// Checks speed, length, forces and time.
     ///
     /// # Errors
     /// [`RobotError::Configuration`].
@@ -254,8 +254,8 @@ mod tests {
     const FREE_AIR_N: f64 = 2.0;
     const MAX_CYCLES: usize = 10_000;
 
-    /// Descends with an arm that is held in place, so that once the reference moves, the external force is `pressed_n`
-    /// of the spring's own force, N.
+    /// Descends with an arm that is held in place. Once the reference moves, the external force is `pressed_n(f)` for
+    /// the force `f` of the spring, both in N.
     fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
         let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let mut descent = Descent::new(touch_down, &arm, q, still);

@@ -15,7 +15,8 @@ pub enum StopReason {
     Interrupted,
     /// The arm reported an impossible state.
     Implausible(String),
-    /// The arm reported no state for longer than [`MAX_SILENCE_SECS`] of its clock, or a motion did not end.
+    /// The arm reported no state for longer than allowed by its clock ([`MAX_SILENCE_SECS`] or
+    /// [`Watch::allow_silence`]), or a motion did not end.
     Watchdog(String),
     /// The arm's controller is in a mode in which it does not move.
     Mode(ArmMode),
@@ -90,7 +91,7 @@ impl Watch {
     pub(crate) fn begin(&mut self) {
         self.stop = None;
         if let Some(state) = self.states.back_mut() {
-            // Earlier states stay in the history, but the time since them does not count as a gap.
+            // A state is compared only with a previous one in mode `Moving`.
             state.mode = ArmMode::Idle;
         }
     }

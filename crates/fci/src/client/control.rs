@@ -1,7 +1,7 @@
 //! Control loops: a closure that answers every state, once per millisecond.
 //!
-//! A closure returns [`ControlFlow::Continue`] with the next command, or [`ControlFlow::Break`] with the last one, which
-//! should leave the arm at rest: the robot ends a motion that still moves with an error.
+//! A closure returns [`ControlFlow::Continue`] with the next command, or [`ControlFlow::Break`] with the last one,
+//! which should leave the arm at rest: if the arm still moves then, the robot reports an error.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -41,7 +41,7 @@ pub type Answer<T> = ControlFlow<T, T>;
 impl Robot {
     /// Commands joint positions (rad), one command for each state.
     ///
-    /// The closure gets the state and the time since the last one by the robot's clock (zero at first). The first
+    /// The closure gets the state and the time since the previous state by the robot's clock (zero at first). The first
     /// command may differ from `state.q_desired` only by a small step.
     ///
     /// # Errors

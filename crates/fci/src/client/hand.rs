@@ -53,7 +53,8 @@ impl Hand {
     /// Connects to the hand of a robot by name or IP address.
     ///
     /// # Errors
-    /// [`FciError::Socket`], or [`FciError::Version`] for a hand with another protocol version.
+    /// [`FciError::Socket`]; [`FciError::Version`] for a hand with another protocol version; [`FciError::Timeout`] or
+    /// [`FciError::Closed`] if the hand does not answer.
     pub fn connect(host: &str, config: &HandConfig) -> Result<Self> {
         let mut session = Session::connect(resolve(host, config.port)?, HeaderKind::Hand, config.timeout)?;
         let request = HandRequest::Connect { version: HAND_VERSION, udp_port: session.udp_port()? };
@@ -112,7 +113,7 @@ impl Hand {
         self.execute(&HandRequest::Grasp { width, epsilon_inner, epsilon_outer, speed, force })
     }
 
-    /// Stops the fingers and releases the part.
+    /// Stops the fingers and ends a grasp.
     ///
     /// # Errors
     /// As for [`Hand::homing`].

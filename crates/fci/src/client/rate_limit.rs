@@ -16,7 +16,8 @@ const MARGIN: f64 = 1e-3;
 const NUM_LOST_BEFORE_LIMIT: f64 = 3.0;
 
 /// The joint positions (rad) nearest to `q` that the robot accepts after `state`. Velocity, acceleration and jerk are
-/// within `limits`, and the velocity can stay within them in the next cycles. Positions are not limited.
+/// within `limits`, and the velocity can stay within them in the next cycles; an exception are joints 5 and 7 of an FR3
+/// near their ends, where the velocity limit decreases faster than they may brake. Positions are not limited.
 pub fn limit_joint_positions(limits: &Limits, state: &RobotState, q: &[f64; 7]) -> [f64; 7] {
     std::array::from_fn(|joint| {
         let (last_q, last_dq, last_ddq) = (state.q_desired[joint], state.dq_desired[joint], state.ddq_desired[joint]);
@@ -32,7 +33,7 @@ pub fn limit_joint_positions(limits: &Limits, state: &RobotState, q: &[f64; 7]) 
         let smallest = (braking * (min_velocity - last_dq)).max(-max_acceleration);
         let acceleration = acceleration.min(largest).max(smallest).clamp(-max_acceleration, max_acceleration);
         // Unlike in libfranka, the jerk is limited last: the velocity limit of an FR3 decreases towards a joint's end,
-        // and following it at once would require a jerk beyond the limit. The margin is sufficient for that.
+        // and following it at once would require a jerk beyond the limit. The margin of the velocity covers the delay.
         let acceleration = acceleration.clamp(last_ddq - step, last_ddq + step);
         last_q + (last_dq + acceleration * PERIOD_SECS) * PERIOD_SECS
     })

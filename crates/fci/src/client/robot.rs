@@ -22,7 +22,7 @@ const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 pub struct RobotConfig {
     /// TCP port of the robot.
     pub port: u16,
-    /// The protocol version. With `None`, the client tries version 5, then the version that the robot answers.
+    /// The protocol version. With `None`, the client tries version 5, then version 10 if the robot answers with it.
     pub version: Option<Version>,
     /// Maximum duration of a wait for a response or a state; for stop and recovery it is 10 s.
     pub timeout: Duration,

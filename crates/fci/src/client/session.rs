@@ -14,7 +14,7 @@ use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
 /// Maximum number of received responses that are not yet processed; further ones wait in the network. A robot sends one
-/// response for each request.
+/// response for each request, and two for a Move.
 const MAX_WAITING: usize = 16;
 /// Maximum number of kept responses to requests for which no call waits yet; the oldest are dropped.
 const MAX_KEPT: usize = 16;
@@ -114,7 +114,7 @@ impl Session {
         }
     }
 
-    /// Timeout of responses to commands without a motion.
+    /// The timeout of this session, see [`Self::connect`].
     pub(crate) fn timeout(&self) -> Duration {
         self.timeout
     }

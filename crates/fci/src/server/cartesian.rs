@@ -156,7 +156,7 @@ pub fn smallest_singular_value(jacobian: &Jacobian) -> f64 {
 }
 
 /// The step of the joints that moves the end effector by `motion` (m and rad in the base frame). If the elbow is
-/// commanded, joint 3 moves by `elbow_step`; otherwise this is the smallest such step.
+/// commanded, joint 3 moves by `elbow_step`; otherwise the result is the smallest such step.
 pub fn joint_step(jacobian: &Jacobian, motion: &Vector6<f64>, elbow_step: Option<f64>) -> JointVector {
     match elbow_step {
         None => damped_step(jacobian, motion),

@@ -12,7 +12,8 @@ pub enum Pace {
     /// A thousand cycles per second, as on a robot; late commands are lost.
     RealTime,
     /// During motions, the next cycle starts after the client's answer, or after `max_wait` as with a lost command.
-    /// Time advances during motions and while arm or fingers move, so that a run is the same on every machine.
+    /// The simulation advances only during motions and while arm or fingers move, so that a run is the same on every
+    /// machine.
     Lockstep {
         /// Maximum duration of the wait for a client's answer.
         max_wait: Duration,

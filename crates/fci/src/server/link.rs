@@ -17,9 +17,9 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// Time that a second client waits for the end of the first, so that a client that has just disconnected can connect
 /// again at once. It is shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
-/// Number of events that wait for the loop; beyond it, a client's further messages wait in the network.
+/// Maximum number of events that wait for the loop; a client's further messages wait in the network.
 const MAX_EVENTS: usize = 64;
-/// Number of datagrams read in one call, so that a flood of datagrams of others does not delay the loop.
+/// Maximum number of datagrams read in one call, so that a flood of datagrams of other senders does not delay the loop.
 const MAX_DATAGRAMS: usize = 64;
 /// Time until the next attempt if no connection can be accepted, for example because no file descriptor is free.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(10);

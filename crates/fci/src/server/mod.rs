@@ -2,7 +2,7 @@
 //! and version 3 for the hand).
 //!
 //! [`RobotCore`] and [`HandCore`] are robot and hand without sockets and clock: every cycle takes the client's command,
-//! if any, and returns the next state. [`Server`] connects them to the network.
+//! if any, and leads to the next state. [`Server`] connects them to the network.
 
 mod cartesian;
 mod communication;

@@ -5,7 +5,7 @@ use super::plant::{Observation, Plant};
 use super::robot::RobotCore;
 use crate::wire::robot_error::RobotError;
 
-/// Largest excess of measured velocities over the commanded limit, rad/s or m/s, before the robot stops.
+/// Largest excess of measured velocities over the limit of commanded ones, rad/s or m/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
 /// Largest excess of measured positions over the range of commanded ones, rad.
 const MEASURED_POSITION_MARGIN: f64 = 0.01;

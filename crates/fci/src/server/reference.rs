@@ -7,9 +7,10 @@ use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// One cycle in seconds.
 pub const PERIOD_SECS: f64 = 1e-3;
-/// The controllers overshoot an acceleration that changes suddenly by up to a quarter; the arm stays within its limit.
+/// Fraction of the acceleration limits for braking: the controllers overshoot a sudden change of the acceleration by up
+/// to a quarter, so that the arm just stays within its limits.
 const BRAKING: f64 = 0.8;
-/// Rounding differences of doubles are not violations.
+/// Factor of the limits: rounding differences of doubles are not violations.
 pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
 
 /// The controller's reference of the joints: `q_d`, `dq_d`, `ddq_d`.
@@ -118,7 +119,7 @@ mod tests {
     #[test]
     fn each_limit_is_told_just_outside_and_not_just_inside() {
         let rest = with_joint_1([0.0; 3]);
-        // 7500 rad/s³ for a millisecond from rest: 7.5e-6 rad.
+        // 7500 rad/s³ for a millisecond from rest: 7.5 rad/s², which give 7.5e-3 rad/s in the same cycle.
         for (share, expected) in [(0.999, vec![]), (1.001, vec!["joint_motion_generator_acceleration_discontinuity"])] {
             assert_eq!(names(&rest, &rest.after_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
         }

@@ -20,8 +20,8 @@ use crate::wire::{
 /// Number of cycles of a recovery during which the arm yields to contacts, so that the next motion does not start in a
 /// collision.
 const RECOVERY_CYCLES: u32 = 200;
-/// The simulation pauses once the measured velocities are below this limit, rad/s, or after [`MAX_SETTLING_CYCLES`]
-/// without a motion: an arm that presses on an object may never be completely at rest.
+/// In lockstep, the simulation pauses once the measured velocities are below this limit, rad/s, or after
+/// [`MAX_SETTLING_CYCLES`] without a motion: an arm that presses on an object may never be completely at rest.
 const STILL: f64 = 1e-3;
 const MAX_SETTLING_CYCLES: u32 = 1000;
 /// A measured joint velocity below this, rad/s, counts as rest.
@@ -261,7 +261,7 @@ impl RobotCore {
         self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
     }
 
-    /// Ends the motion; the Move is answered when the arm is at rest.
+    /// Ends the motion. The Move is answered when the arm is at rest if `status` is a success, otherwise at once.
     fn end_motion(&mut self, status: Status) {
         let Some(motion) = self.motion.take() else { return };
         self.mode = RobotMode::Idle;
@@ -274,7 +274,8 @@ impl RobotCore {
         }
     }
 
-    /// Stops because of errors: the motion ends, the arm brakes, and nothing moves until the recovery.
+    /// Stops because of errors: the motion ends, the arm brakes or, after a collision, stops at once; nothing moves
+    /// until the recovery.
     pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;
@@ -331,7 +332,7 @@ impl RobotCore {
         self.waiting.push(outgoing(command_id, command, status));
     }
 
-    /// Sends the answers that waited until the arm was at rest.
+    /// Sends the waiting answers if the arm is at rest.
     fn send_waiting(&mut self) {
         let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
         if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {

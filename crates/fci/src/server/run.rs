@@ -22,7 +22,7 @@ use crate::wire::{
 const VERSION: Version = Version::V5;
 /// Duration of a cycle.
 const PERIOD: Duration = Duration::from_millis(1);
-/// Numbers of requests and of datagrams that are handled before the loop looks at its clock again: a client that floods
+/// Maximum numbers of requests and of datagrams that are handled before the loop checks the clock: a client that floods
 /// the server does not stop the arm's control.
 const MAX_REQUESTS: usize = 64;
 const MAX_COMMANDS: usize = 64;
@@ -229,7 +229,7 @@ impl Loop {
         }
     }
 
-    /// During a motion, waits for the answer to the last state; otherwise follows the clock.
+    /// During a motion, waits for the answer to the last state. Without a motion, waits for the clock if nothing moves.
     fn await_command(&mut self, max_wait: Duration) -> Option<RobotCommand> {
         self.serve_requests();
         let Some(has_started) = self.robot.expects_commands() else {

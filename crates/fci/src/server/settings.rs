@@ -118,7 +118,7 @@ impl Settings {
                 }
                 is_valid
             }
-            // Hand guiding has no effect on a simulated robot, and filters are left to the client.
+            // Hand guiding and filters have no effect on the simulated robot.
             Request::SetGuidingMode(_) => true,
             Request::SetFilters(frequencies) => frequencies.iter().all(|value| *value > 0.0 && *value <= 1000.0),
             _ => return None,

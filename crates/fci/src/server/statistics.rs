@@ -8,17 +8,17 @@ pub const STALL: Duration = Duration::from_millis(20);
 /// Counts since the server started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ServerStatistics {
-    /// Number of states that were sent.
+    /// Number of states, one for each cycle; a state is sent only if a client is connected.
     pub num_states: u64,
     /// Number of cycles within motions, from the first command of each motion on.
     pub num_motion_cycles: u64,
     /// Number of commands that arrived in their own cycle.
     pub num_commands: u64,
-    /// Number of commands that arrived too late.
+    /// Number of commands of a motion that carry the number of another cycle, usually because they arrived too late.
     pub num_late: u64,
     /// Number of datagrams that are not commands.
     pub num_invalid: u64,
-    /// Number of motions that were started.
+    /// Number of requests to start a motion, including refused ones.
     pub num_motions: u64,
     /// Number of cycles that started more than 20 ms too late.
     pub num_stalls: u64,

@@ -36,7 +36,7 @@ pub struct EndEffector {
 
 /// Impedance of the end effector: `Jᵀ (K e + D (v_d - J dq)) + M ddq_d + coriolis`, and a weak impedance of the elbow
 /// in the null space. `K` is in N/m and N·m/rad along the base's axes; `D` is computed for each direction from the
-/// effective inertia in it.
+/// effective inertia in this direction.
 pub fn cartesian_impedance(
     robot: &Observation,
     end_effector: &EndEffector,
@@ -53,7 +53,7 @@ pub fn cartesian_impedance(
     });
     let elbow =
         (reference.q - robot.q) * NULLSPACE_STIFFNESS + (reference.dq - robot.dq) * (2.0 * NULLSPACE_STIFFNESS.sqrt());
-    // The part of the elbow's torque that does not accelerate the end effector.
+    // Subtracting `felt_by_ee` leaves the part of the elbow's torque that does not accelerate the end effector.
     let inverse = robot.mass.try_inverse().unwrap_or_else(SMatrix::identity);
     let felt_by_ee = jacobian.transpose() * (felt_inertia * (jacobian * (inverse * elbow)));
     jacobian.transpose() * wrench + (elbow - felt_by_ee) + robot.mass * reference.ddq + robot.coriolis

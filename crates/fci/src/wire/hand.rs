@@ -76,7 +76,7 @@ pub enum HandRequest {
         /// Speed, m/s.
         speed: f64,
     },
-    /// Stops the fingers and releases the part.
+    /// Stops the fingers and ends a grasp.
     Stop,
 }
 

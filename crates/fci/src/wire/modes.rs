@@ -2,7 +2,7 @@
 
 use crate::wire_error::WireError;
 
-/// Defines an enum of bytes, and its names for messages.
+/// Defines an enum of bytes and its conversion from a byte.
 macro_rules! byte_enum {
     ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
         $(#[$doc])*

@@ -26,9 +26,9 @@ pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 
 pub struct RobotState {
     /// Milliseconds since the robot started; a command answers the state of its number.
     pub message_id: u64,
-    /// Measured pose (`O_T_EE`).
+    /// Measured pose of the end effector (`O_T_EE`).
     pub base_from_ee: Transform,
-    /// Pose of the reference (`O_T_EE_d`).
+    /// Pose of the end effector by the reference (`O_T_EE_d`).
     pub base_from_ee_desired: Transform,
     /// End effector relative to the flange (`F_T_EE`).
     pub flange_from_ee: Transform,

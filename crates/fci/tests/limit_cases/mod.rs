@@ -21,8 +21,8 @@ use signal::{Axis, Signal};
 const MARGIN: f64 = 0.005;
 /// Excess of measured velocities over the limit, rad/s, at or soon after which the robot stops.
 const MEASURED_BEYOND: f64 = 0.4;
-/// Margin for measured velocities of the end effector, m/s: they overshoot the commanded ones, and a robot may stop
-/// only 0.1 m/s above the limit.
+/// Margin for measured velocities of the end effector, m/s: they overshoot the commanded ones, and a robot may tolerate
+/// them up to 0.1 m/s above the limit.
 const MEASURED_END_MARGIN: f64 = 0.1;
 /// The usual start configuration of a Panda, rad.
 pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];

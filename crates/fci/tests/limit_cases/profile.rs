@@ -47,7 +47,7 @@ impl Profile {
 
     /// Moves smoothly by a distance in `duration_ms`.
     pub fn distance(distance: f64, duration_ms: u32) -> Self {
-        // The integral of the velocity is the peak times the ramp.
+        // One ramp up and one ramp down.
         let ramp_ms = duration_ms / 2;
         let shape = Self::velocity(1.0, ramp_ms);
         let length = shape.offset(u64::MAX);

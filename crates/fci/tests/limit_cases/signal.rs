@@ -42,7 +42,7 @@ pub enum Signal {
     Frame { scale: f64 },
     /// `num` successive answers are omitted.
     Unanswered { num: u64 },
-    /// The speed of an end effector that is set [`FAR_END_M`] beyond its position and moved by joint 6.
+    /// The speed of an end effector whose frame is [`FAR_END_M`] beyond the finger tips; joint 6 moves it.
     FarEnd { profile: Profile },
     /// A constant pose, started from joint positions.
     StandingPose { from: [f64; 7] },

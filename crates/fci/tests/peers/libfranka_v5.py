@@ -49,7 +49,8 @@ def swing(duration):
 def run(name, control, command, duration, **options):
     """Runs a motion with the commands of command(state, secs); returns its clock.
 
-    In real time, a motion may be stopped for commands that were lost: for twenty in a row, or for what the next one looks like after a gap.
+    In real time, a motion may be stopped because commands were lost: after twenty in a row, or because the first command after a gap
+    violates a limit.
     """
     clock = Clock()
     if not LOCKSTEP and robot.read_once().robot_mode == libfranka.RobotMode.kReflex:

@@ -30,7 +30,7 @@ impl JointLimits {
 }
 
 impl CartesianLimits {
-    /// The FR3's limits; the tcp has the speed limit of a Panda's.
+    /// The FR3's limits; the speed limit of the tcp is that of a Panda.
     pub const fn fr3() -> Self {
         Self {
             velocity_m_s: Self::panda().velocity_m_s,

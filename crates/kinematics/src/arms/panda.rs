@@ -112,9 +112,8 @@ const SELF_PAIRS: [(usize, usize); 23] = [
     (5, HELD),
 ];
 
-/// Capsules placed by hand around the shapes of crates/simulation/assets/panda.xml. The test
-/// crates/simulation/tests/collision_model.rs checks that they contain the whole arm, and measures how far they extend
-/// beyond it.
+/// Capsules placed by hand around the shapes of crates/simulation/assets/panda.xml. A test in
+/// crates/simulation/src/extent.rs checks that they contain all visible shapes and do not extend too far beyond them.
 fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [
@@ -163,7 +162,7 @@ fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     ]
 }
 
-/// Fewer and wider capsules. A test in `simulation` compares them with the shapes of the simulated arm.
+/// Fewer and wider capsules. A test in the same file checks that they contain all visible shapes.
 fn wide_capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [

@@ -86,7 +86,7 @@ impl ArmShape {
         shape
     }
 
-    /// Adds the capsules of a held part, given in the tcp's frame.
+    /// Sets the capsules of the held part, given in the tcp's frame.
     pub(super) fn hold(&mut self, in_tcp: &[Capsule]) {
         self.capsules[HELD] = in_tcp.iter().map(|capsule| capsule.moved(&self.link7_from_tcp)).collect();
         self.update();
@@ -167,8 +167,8 @@ fn origin_distance_m(joints: &[DhJoint; NUM_JOINTS], first: usize, second: usize
     let mut distance_m = 0.0;
     let mut at = first;
     while at < second {
-        // If a link's origin lies on the next joint's axis, and the link after that starts perpendicular to that axis,
-        // the distance to that link's origin is independent of the joint.
+        // If a link's origin lies on the axis of the next joint, and the offset of the following link is perpendicular
+        // to that axis, the distance between the first and the last origin does not depend on the joint's angle.
         if at + 2 <= second && joints[at].a_m == 0.0 && joints[at + 1].d_m == 0.0 {
             distance_m += step(at + 1).hypot(step(at + 2));
             at += 2;

@@ -46,7 +46,8 @@ impl Lanes {
 }
 
 impl<'a> Checker<'a> {
-    /// For motions that keep `margin_m` from all bodies at every checked configuration, and touch none between these.
+    /// Creates a checker that requires `margin_m` between bodies at every checked configuration, and no contact between
+    /// these configurations.
     ///
     /// A larger margin allows longer steps near obstacles.
     pub fn new(model: &'a CollisionModel, margin_m: f64) -> Self {
@@ -109,8 +110,8 @@ impl<'a> Checker<'a> {
         max_turns: &JointVector,
     ) -> Option<f64> {
         let weights = self.edge_weights(max_turns);
-        // Lane i starts at the fraction i / (L - 1) of the length, and ends at the start of the next lane. The last lane
-        // is at the end.
+        // Lane i starts at the fraction i / (L - 1) of the length, and ends at the start of the next lane. The last
+        // lane is at the end.
         let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
         let mut share: Lane = std::array::from_fn(start);
         let mut active: Lanes = Lanes::all();

@@ -30,7 +30,7 @@ pub enum CollisionError {
         /// The name of both.
         name: String,
     },
-    /// A pair that may touch names an obstacle that does not exist.
+    /// A contact was allowed with an obstacle that does not exist.
     #[error("no obstacle is named \"{name}\"; the obstacles are: {existing}")]
     UnknownObstacle {
         /// The name that was given.

@@ -81,7 +81,7 @@ pub(super) fn link_frames(joints: &[DhJoint; NUM_JOINTS], q: &[JointVector; NUM_
         for i in 0..NUM_LANES {
             (sine[i], cosine[i]) = q[i][joint_idx].sin_cos();
         }
-        // alpha is 0 or ±90°, so the rotated axes are the parent's in another order.
+        // alpha is 0 or ±90°, so the rotated axes are the parent's in another order and with other signs.
         let (sin_alpha, cos_alpha) = joints[joint_idx].twist();
         let (a, d) = (joints[joint_idx].a_m, joints[joint_idx].d_m);
         let mut next = FrameLanes::base();

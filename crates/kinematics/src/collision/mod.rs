@@ -6,8 +6,8 @@
 //! pairs that may touch ───┘                   └─> nearest: names, distance, gradient
 //! ```
 //!
-//! Capsules contain the real shapes with some margin: if the capsules do not touch, the arm does not either.
-//! crates/simulation compares them with MuJoCo.
+//! Capsules contain the visible shapes of the arm: if the capsules do not touch, these shapes do not touch either.
+//! Tests in crates/simulation check this, and compare the collisions with MuJoCo's.
 
 mod arm_shape;
 mod checker;

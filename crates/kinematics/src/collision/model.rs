@@ -31,8 +31,8 @@ pub struct Proximity {
     pub other: String,
     /// Distance between the surfaces, m; negative if they overlap.
     pub distance_m: f64,
-    /// Derivative of the distance with respect to each joint, m/rad. It is one of several if a capsule's axis is inside
-    /// an obstacle or parallel to the nearest surface.
+    /// Derivative of the distance with respect to each joint, m/rad. The derivative is not unique if a capsule's axis
+    /// is inside an obstacle or parallel to the nearest surface.
     pub gradient: JointVector,
 }
 
@@ -64,7 +64,8 @@ impl CollisionModel {
     /// The base is not compared with obstacles, because it is fixed to one.
     ///
     /// # Errors
-    /// [`CollisionError`] for impossible lengths and poses, and for duplicate names.
+    /// [`CollisionError`] for impossible lengths and poses, for duplicate names, and for an opening outside the hand's
+    /// range.
     pub fn new(arm: &ArmGeometry, obstacles: Vec<Obstacle>, opening_m: f64) -> Result<Self, CollisionError> {
         for (index, obstacle) in obstacles.iter().enumerate() {
             check_obstacle(obstacle)?;
@@ -85,7 +86,7 @@ impl CollisionModel {
         Ok(Self { geometry: arm.clone(), arm: ArmShape::new(arm, opening_m), obstacles, obstacle_frames, may_touch })
     }
 
-    /// Adds a held part: capsules that contain it, in the tcp's frame. The part may touch the hand and links 6 and 7.
+    /// Sets the held part: capsules that contain it, in the tcp's frame. The part may touch the hand and links 6 and 7.
     ///
     /// # Errors
     /// [`CollisionError`] for coordinates that are not finite, and for radii that are not positive or exceed 100 m.
@@ -120,7 +121,7 @@ impl CollisionModel {
         }
     }
 
-    /// The arm, at any opening.
+    /// The geometry of the arm, which does not contain the opening of the fingers.
     pub fn arm(&self) -> &ArmGeometry {
         &self.geometry
     }

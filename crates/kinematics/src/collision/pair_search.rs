@@ -28,8 +28,8 @@ impl Placed {
     }
 }
 
-/// Factors by which distances are multiplied before the minimum is taken: for each pair of bodies, and for each body
-/// and the fixed bodies.
+/// Factors by which distances are multiplied before the minimum is taken: for each pair of the arm's bodies, and for
+/// each body and the obstacles.
 #[derive(Debug, Clone)]
 pub(super) struct Weights {
     pub(super) self_pairs: [[f64; NUM_BODIES]; NUM_BODIES],

@@ -204,8 +204,8 @@ mod tests {
                 let sampled = (0..=2000)
                     .map(|i| shape.signed_distance_m(&(a + (b - a) * (f64::from(i) / 2000.0))))
                     .fold(f64::INFINITY, f64::min);
-                // The distance of samples from the closest point of the segment is at most half a step, which is 1/2000
-                // of its length.
+                // The distance of samples from the closest point of the segment is at most half a step; a step is
+                // 1/2000 of the segment.
                 assert!(found <= sampled + 1e-9 && found > sampled - 6e-4, "{shape:?}: {found} {sampled}");
             }
         }

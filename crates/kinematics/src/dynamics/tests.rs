@@ -9,8 +9,8 @@ use crate::test_poses::random_configuration;
 
 #[test]
 fn a_load_straight_out_weighs_what_its_lever_says() {
-    // The arm is stretched to the side at the height of its shoulder: joint 2 is at 90°, the others at 0. The load is 1
-    // m from the axis of joint 2.
+    // The arm is stretched forwards at the height of its shoulder: joint 2 is at 90°, the others at 0. The load is
+    // 0.893 m outwards from the axis of joint 2.
     let mut q = JointVector::zeros();
     q[1] = std::f64::consts::FRAC_PI_2;
     let bare = ArmDynamics::new(&ArmGeometry::panda(), 0.08);

@@ -91,7 +91,7 @@ fn most_descents_from_the_best_configuration_succeed() {
             }
         }
     }
-    // The other lines need another start configuration, which `Panda::approach` chooses.
+    // The other lines need another start configuration, which `ArmGeometry::approach` chooses.
     assert!(num_followed >= 285, "{num_followed}");
 }
 

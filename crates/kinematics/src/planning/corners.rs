@@ -7,7 +7,7 @@ use crate::rounded_path::{Corner, RoundedPath, length_secs};
 /// Factor between the sizes that are tried for a corner, down to the minimum. Below the minimum the arm stops instead.
 const SMALLER: f64 = 0.7;
 const MIN_SIZE_SECS: f64 = 2e-3;
-/// Minimum factor by which a found size could be increased for a further check.
+/// Minimum increase, as a factor of the known free size, for which a larger size is checked.
 const MIN_GROWTH: f64 = 1.15;
 
 /// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole. If
@@ -38,8 +38,8 @@ pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec
     split_at_stops(&waypoints, &sizes)
 }
 
-/// The largest size up to `room`, among those tried, for which the corner is free; at least `known_free`; 0 if there is
-/// none.
+/// The largest of the tried sizes up to `room` for which the corner is free; otherwise `known_free`, which is 0 if no
+/// size is known to be free.
 fn largest_free(checker: &mut Checker<'_>, corner: &Corner, room: f64, known_free: f64) -> f64 {
     let mut size = room;
     while size > (known_free * MIN_GROWTH).max(MIN_SIZE_SECS) {

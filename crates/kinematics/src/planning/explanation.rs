@@ -4,10 +4,10 @@ use crate::collision::{Checker, CollisionModel, Proximity};
 use crate::planning::plan::Plan;
 use crate::{JointVector, Trajectory};
 
-/// Number of points on the straight motion at which distances are computed.
+/// Number of equal parts of a straight motion, at whose ends distances are computed.
 const NUM_PLACES: usize = 64;
 
-/// The path from one waypoint to the next, each at the closest point of its rounded corner.
+/// The part of a motion from one waypoint to the next. A waypoint is passed where the motion is closest to it.
 #[derive(Debug, Clone)]
 pub struct PlanPart {
     /// The waypoint at the end.
@@ -18,7 +18,7 @@ pub struct PlanPart {
     pub nearest: Proximity,
 }
 
-/// The parts of a plan, with their motion: a waypoint is passed where the motion is closest to it.
+/// Divides the motions of a plan into parts.
 pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -> Vec<PlanPart> {
     let mut parts = Vec::new();
     let mut waypoints = plan.waypoints[1..].iter();
@@ -40,7 +40,7 @@ pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -
     parts
 }
 
-/// Number of points on a motion among which the closest one to a waypoint is searched.
+/// Number of equal parts of a motion, among whose ends the closest one to a waypoint is searched.
 const NUM_SAMPLES: usize = 1000;
 /// Configurations closer together than this are equal, rad.
 const SAME_RAD: f64 = 1e-9;

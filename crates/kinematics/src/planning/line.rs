@@ -11,7 +11,7 @@ use crate::path::{JointPath, LineOptions};
 /// A straight motion of the tcp, and its free fraction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedLine {
-    /// Fraction of the motion that can be followed without a forbidden contact, 0 to 1.
+    /// Fraction of the motion that can be followed without a forbidden contact and within the joint limits, 0 to 1.
     pub share: f64,
     /// The whole motion, if [`CheckedLine::share`] is 1.
     pub path: Option<JointPath>,

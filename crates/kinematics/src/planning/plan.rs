@@ -285,9 +285,9 @@ impl ArmGeometry {
     }
 }
 
-/// Number of checks that a further search may do in addition to those of [`FURTHER_CHECKS_RATIO`].
+/// A further search may do this number of checks plus [`FURTHER_CHECKS_RATIO`] times those of the first search.
 const MIN_FURTHER_CHECKS: usize = 1000;
-/// Number of checks that a further search may do, as a multiple of the first search's, without [`MIN_FURTHER_CHECKS`].
+/// Factor of the first search's checks, see [`MIN_FURTHER_CHECKS`].
 const FURTHER_CHECKS_RATIO: usize = 2;
 /// Maximum length of a motion that a further search adds at once, rad. Shorter motions than those of the first search
 /// find narrower and faster paths.

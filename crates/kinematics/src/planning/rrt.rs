@@ -36,7 +36,7 @@ impl Samples {
         Self(vec![[limits.position_min, limits.position_max]])
     }
 
-    /// Only configurations that can be on a path to one of the goals whose duration at full speed is below `max_secs`.
+    /// Only configurations that can be on a path to one of the goals that takes less than `max_secs` at full speed.
     ///
     /// On such a path, a joint leaves the range between its start and its goal by at most half of its remaining travel.
     /// Without obstacles, every goal must be reachable on a straight line within that time.

@@ -102,7 +102,7 @@ fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
     *waypoints = kept;
 }
 
-/// The motion at a time, given by its start waypoint, and the configuration at that time.
+/// The index of the last waypoint before a time (s, at full speed), and the configuration at that time.
 fn place(waypoints: &[JointVector], limits: &JointLimits, mut secs: f64) -> (usize, JointVector) {
     for (index, pair) in waypoints.windows(2).enumerate() {
         let duration_secs = motion_secs(&pair[0], &pair[1], limits);

@@ -68,7 +68,7 @@ impl Worst {
 
             let too_much = acceleration.max(torque_stretch.powi(2)).max(1.0);
             let is_by_path = share(&by_path, &joints.jerk_max) > share(&by_profile, &joints.jerk_max);
-            // If time is stretched by k, jerks are k³ lower, and ṡ² and s̈ are k² lower.
+            // If time is stretched by k, jerks are divided by k³, and ṡ² and s̈ by k².
             let (less, slower) = match jerk > 1.0 + TOLERANCE {
                 true if is_by_path => (jerk.powf(2.0 / 3.0), jerk.powf(2.0 / 3.0)),
                 true => (jerk, 1.0),
@@ -105,8 +105,8 @@ impl Worst {
     }
 }
 
-/// Maximum jerk that corners add to the start or end of an acceleration, as a fraction of the limit. A change from one
-/// extreme to the other has twice the limit.
+/// Jerk, as a fraction of the limit, that corners at the start or end of an acceleration do not reach. A change from
+/// one extreme to the other has twice the limit.
 const JUMP_JERK: f64 = 1.3;
 
 /// Times that are at most `max_secs` apart, including those of each jump of the profile's jerk, and those just before

@@ -6,9 +6,9 @@
 //!               └──────────────── limits lowered where the mean violates one ◄───────────┘
 //! ```
 //!
-//! Without a jerk limit, the time optimum along a path is known up to the resolution of its grid (phase_plane.rs), but
-//! s̈ jumps. The mean of s̈ over a moving time window (profile.rs) has jerks of at most the jump divided by the
-//! window's length, stays on the path, and takes longer only by that length: 2 or 4 ms with Franka's limits. Limits
+//! Without a jerk limit, the time optimum along a path is known up to the resolution of the grid (phase_plane.rs), but
+//! s̈ jumps. With the mean of s̈ over a moving time window (profile.rs), the jerk is at most the jump divided by the
+//! window's length, and the motion takes longer only by that length: 2 or 4 ms with Franka's limits. Limits
 //! that the mean violates, mainly in corners, are lowered there for another pass; remaining violations are removed by
 //! stretching the time of the whole motion.
 
@@ -36,7 +36,7 @@ pub(crate) struct Timing {
     pub(crate) jerkless_secs: f64,
 }
 
-/// Maximum number of passes, including the first, without lowered limits; most motions need three or four.
+/// Maximum number of passes, including the first, which has no lowered limits; most motions need three or four.
 const MAX_PASSES: usize = 6;
 /// Limits violated by less than this fraction are left to the stretching.
 const TOLERANCE: f64 = 1e-3;

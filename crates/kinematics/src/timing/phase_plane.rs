@@ -1,7 +1,7 @@
 //! The time optimum along a path without a jerk limit.
 //!
 //! Backwards from rest at the end: at each point, the largest ṡ² from which the end can be reached. Forwards from rest
-//! at the start: always the largest s̈ that stays below it. Constraints hold at both ends of a part.
+//! at the start: always the largest s̈ that keeps ṡ² below that bound. Constraints hold at both ends of a part.
 //!
 //! # Source
 //! H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
@@ -30,7 +30,7 @@ type Bound = (f64, f64);
 
 /// A row with a smaller slope only bounds ṡ².
 const FLAT: f64 = 1e-9;
-/// Empty intervals of s̈ smaller than this are rounding errors of a single value.
+/// If the lower bound on s̈ exceeds the upper one by less than this, the difference is a rounding error.
 const ROUNDING: f64 = 1e-10;
 const MAX_STEPS: usize = 60;
 
@@ -120,7 +120,7 @@ impl Part {
             if gap >= -ROUNDING {
                 return squared;
             }
-            // The gap is concave, so its tangent does not reach zero before the gap itself does.
+            // The gap is concave, so its tangent lies above it, and the step does not pass the largest valid ṡ².
             let rate = high.1 - low.1;
             if rate >= 0.0 {
                 return 0.0;

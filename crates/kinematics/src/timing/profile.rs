@@ -79,7 +79,8 @@ impl Profile {
         }
     }
 
-    /// Times between which the jerk is constant, with further ones so that no two are more than `max_secs` apart.
+    /// Times between which the jerk is constant, with further ones so that successive times are at most `max_secs`
+    /// apart.
     pub(super) fn times(&self, max_secs: f64) -> Vec<f64> {
         let mut jumps: Vec<f64> =
             self.knots.iter().flat_map(|knot| [knot.time, knot.time + self.window_secs]).collect();

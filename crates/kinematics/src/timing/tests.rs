@@ -64,7 +64,7 @@ fn one_joint_alone_takes_the_time_of_the_textbook() {
     )
     .unwrap();
     let expected = 2.0 / 2.175 + 2.175 / 15.0 + 15.0 / 7500.0;
-    // The tolerance covers the grid's last part before full speed, and the margin.
+    // The tolerance covers the grid's last part before full speed, and `HEADROOM`.
     assert!((motion.duration_secs() / expected - 1.0).abs() < 2e-3, "{} of {expected}", motion.duration_secs());
 }
 

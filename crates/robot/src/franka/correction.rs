@@ -1,4 +1,4 @@
-//! Returns a difference between the robot's reference and the trajectory to zero along a quintic.
+//! Reduces a difference between the robot's reference and the trajectory to zero along a quintic.
 
 use std::ops::Sub;
 
@@ -7,8 +7,8 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// Duration of the shortest correction, s: ten times as long as the command losses for which it must converge. Longer
-/// corrections double this duration up to [`MAX_DOUBLINGS`] times.
+/// Duration of the shortest correction, s: ten times as long as the command losses after which corrections must
+/// converge. Longer corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
 /// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which
@@ -46,7 +46,7 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// Creates the shortest correction of a deviation that the limits allow.
+    /// Creates the shortest correction of a deviation within the limits; the longest one if there is none.
     pub(super) fn new(deviation: Deviation, limits: &Limits) -> Self {
         let lasting = |doublings| Self::lasting(&deviation, SHORTEST_SECS * 2_f64.powi(doublings));
         let longest = lasting(MAX_DOUBLINGS);
@@ -76,8 +76,8 @@ impl Correction {
         (c0 + c1 * u + c2 * (u * u)) * (1.0 - u).powi(3)
     }
 
-    /// Whether acceleration and jerk are small fractions of the limits; the initial values of a deviation cannot be
-    /// changed.
+    /// Whether acceleration and jerk are at most [`SHARE`] of the limits. An initial acceleration above that is
+    /// allowed, because it cannot be changed.
     fn keeps_to(&self, deviation: &Deviation, limits: &Limits) -> bool {
         let step = 1.0 / f64::from(NUM_SAMPLES);
         let step_secs = step * self.duration_secs;
@@ -118,7 +118,7 @@ mod tests {
             let differences =
                 |values: &[f64]| values.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_SECS).collect::<Vec<f64>>();
             let accelerations = differences(&differences(&positions));
-            // A continuation of the previous motion: a difference of at most one cycle's jerk.
+            // The previous motion is continued: the acceleration changes by less than the jerk limit allows in a cycle.
             assert!((accelerations[0] - ddq).abs() < 1.5, "{} {ddq}", accelerations[0]);
             let hardest = accelerations.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
             assert!(hardest <= ddq.abs().max(0.3 * 7.5) + 1.0, "{hardest} for {q} {dq} {ddq}");

@@ -29,9 +29,9 @@ const ARRIVED_RAD: f64 = 1e-5;
 /// Largest credible distance of a reference from the trajectory, rad. A robot that continues for 19 cycles without
 /// commands is less than 0.01 rad from its trajectory, so that a larger distance is an error of the reported state.
 const MAX_DEVIATION_RAD: f64 = 0.1;
-/// A robot that sent no state for longer has left the motion.
+/// A robot that sent no state for longer than this, ms, has left the motion.
 const MAX_ELAPSED_MS: u64 = 1000;
-/// Number of cycles after its end at which a motion is finished whatever the reported reference is.
+/// A motion is finished at the latest this number of cycles after the end of the trajectory.
 const MAX_CYCLES_AFTER_END: u32 = 2000;
 
 /// A motion's next command.
@@ -88,7 +88,7 @@ impl<'a> Follower<'a> {
         self.num_corrections
     }
 
-    /// The command that answers a state, which is `elapsed_ms` younger than the last one (0 for the first).
+    /// The command that answers a state, `elapsed_ms` after the previous state by the robot's clock (0 for the first).
     pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
         let mut is_over = false;
         // The trajectory already stands one cycle after the last state.
@@ -113,7 +113,8 @@ impl<'a> Follower<'a> {
             self.correction = None;
         }
         let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
-        // The limits are relative to the reference. If that is impossible, the motion continues unchanged.
+        // The limits are relative to the reference. If the reported reference is impossible, the command is not
+        // limited.
         let limited = match is_credible {
             true => JointVector::from(limit_joint_positions(self.limits, state, &wanted.into())),
             false => wanted,

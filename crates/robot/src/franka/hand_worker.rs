@@ -1,4 +1,4 @@
-//! The hand, whose calls block, in parallel with the arm's loop.
+//! Runs the blocking calls of the hand in a thread, in parallel with the arm's loop.
 
 use std::thread::JoinHandle;
 
@@ -53,7 +53,7 @@ impl HandWorker {
 
     /// Stops the fingers; a call that waits for them returns.
     pub(super) fn stop(&self) {
-        // A hand that cannot be reached does not move either.
+        // An error means that the hand is disconnected; this program cannot stop it then.
         let _ = self.stop.stop();
     }
 
@@ -87,7 +87,7 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
         HandCommand::Grasp { width_m, speed_m_s, force_n } => {
             let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
             let thinner_m = thinner_m.min(width_m - MIN_HELD_WIDTH_M).max(0.0);
-            // Fingers that closed on nothing are not a failure of the hand: its width shows that.
+            // Closing without a part is not a failure of the hand; its width shows that it holds nothing.
             hand.grasp(width_m, speed_m_s, force_n, thinner_m, wider_m).map(drop).map_err(failed)
         }
     }

@@ -34,15 +34,15 @@ use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
-/// Maximum duration of every wait for the robot. A real robot stops by itself after 20 ms; a server in lockstep waits a
-/// second for a lost packet and then continues.
+/// Maximum duration of every wait for the robot. A real robot stops by itself after 20 ms; a server in lockstep waits
+/// half a second for a lost packet and then continues.
 const TIMEOUT: Duration = Duration::from_secs(3);
 /// Maximum delay of a state behind an answer over TCP.
 const MAX_LATE: Duration = Duration::from_secs(1);
 /// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
 const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
 const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];
-/// Factor of these thresholds while the hand holds the part, and where the table may exert forces.
+/// Factor of these thresholds for [`ContactSensitivity::Contact`].
 const CONTACT_FACTOR: f64 = 2.0;
 /// Radius of the ball that determines a load's inertia, m.
 const LOAD_RADIUS_M: f64 = 0.03;

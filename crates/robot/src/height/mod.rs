@@ -18,7 +18,7 @@ pub use settle::{GivenHeight, HeightSource, SettledHeight, settle};
 pub use sighting::Sighting;
 pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, triangulate, triangulate_nearest};
 
-/// How the height of a part is measured during the approach.
+/// How the height of a part is measured before the approach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeightMeasurement {
     /// Height of the camera above the table for both pictures, m.
@@ -39,8 +39,8 @@ impl HeightMeasurement {
     /// Largest height of the camera above the table for both pictures, m.
     pub const MAX_CAMERA_HEIGHT_M: f64 = 0.30;
 
-    /// A measurement with two pictures from 0.3 m above the table, 0.12 m apart, of a part with these heights of marks
-    /// and grasp above the surface under it, m.
+    /// A measurement with two pictures from 0.3 m above the table, 0.12 m apart. `mark_height_m` and `grasp_height_m`
+    /// are above the surface under the part.
     pub fn new(mark_height_m: f64, grasp_height_m: f64) -> Self {
         Self {
             camera_height_m: Self::MAX_CAMERA_HEIGHT_M,
@@ -70,12 +70,12 @@ impl HeightMeasurement {
 pub struct HeightReport {
     /// The height that the grasp uses.
     pub settled: Option<SettledHeight>,
-    /// The measured height: from the lines of sight to the part, and from the surface beside it if it was seen.
+    /// The measured height: from the lines of sight to the part, and from the surface beside it if that was measured.
     pub measured: Option<MeasuredHeight>,
     /// The height from the lines of sight alone.
     pub by_part: Option<MeasuredHeight>,
     /// The reason why nothing was triangulated.
     pub why_not: Option<String>,
-    /// The part in the pictures, in their order.
+    /// The part in the pictures, in the order of the pictures.
     pub sightings: Vec<Sighting>,
 }

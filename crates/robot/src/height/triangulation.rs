@@ -3,9 +3,9 @@
 //! ```text
 //! height = where the lines of sight come nearest     sigma² = (places' sigmas / difference of the slopes)² + relief²
 //! ```
-//! A slope is the sideways distance of a line of sight per metre downwards: two cameras 0.12 m apart at 0.27 m differ
-//! by 0.44. The relief cannot be measured in a picture: walls, feet and rims also produce edges, so that a part appears
-//! slightly above or below its marks, by the same distance each time.
+//! A slope is the sideways distance of a line of sight per metre downwards: the slopes from two camera positions 0.12 m
+//! apart and 0.27 m above the part differ by 0.44. The relief cannot be measured in a picture: walls, feet and rims
+//! also produce edges, so that a part appears slightly above or below its marks, by the same distance each time.
 //!
 //! The sizes in both pictures are used only to match several parts between the pictures, because the errors of a height
 //! from sizes are larger (docs/robot-evidence.md).
@@ -41,7 +41,8 @@ pub struct MeasuredHeight {
 const MAX_APART_SIGMAS: f64 = 4.0;
 
 impl MeasuredHeight {
-    /// The mean of two independent measurements, each weighted by its variance; `None` if they contradict each other.
+    /// The mean of two independent measurements, each weighted by the inverse of its variance; `None` if they
+    /// contradict each other.
     pub fn mean(&self, other: &Self) -> Option<Self> {
         let apart_m = (self.height_m - other.height_m).abs();
         let [own, others] = [self.sigma_m, other.sigma_m].map(|sigma_m| sigma_m.powi(-2));
@@ -67,7 +68,7 @@ pub enum HeightError {
     /// The two lines of sight have nearly the same direction.
     #[error("expected lines of sight whose slopes differ by {MIN_SLOPE_DIFFERENCE} or more, found {difference:.3}")]
     Parallel { difference: f64 },
-    /// The lines of sight cross above a camera, or directly below it.
+    /// The lines of sight cross above a camera or too close below it, or the plane of a sighting is too high.
     #[error(
         "expected a part at least {:.0} mm below the camera, which is {:.0} mm high, found lines of sight that cross at {:.0} mm",
         MIN_DISTANCE_M * 1e3,
@@ -87,8 +88,8 @@ pub enum HeightError {
 /// edges.
 ///
 /// # Errors
-/// [`HeightError`] for pictures from one place, and for lines of sight that are parallel, cross above a camera or do
-/// not cross.
+/// [`HeightError`] for camera positions that are too close together, for lines of sight that are parallel, cross too
+/// high or do not cross, and for invalid numbers.
 pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<MeasuredHeight, HeightError> {
     let is_sound = |sighting: &Sighting| {
         let finite = sighting.camera_m.iter().chain(sighting.middle_m.iter()).all(|value| value.is_finite());

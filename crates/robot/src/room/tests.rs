@@ -25,7 +25,7 @@ fn bar() -> PartShape {
 }
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
-    // A cell in the centre of a rotated tray: the tray's own axes count.
+    // A cell with neighbours on all sides, in a rotated tray: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
 }
 
@@ -54,7 +54,7 @@ fn parts_themselves_need_room() {
 
 #[test]
 fn a_round_part_is_let_go_where_there_is_room() {
-    // Rows of 60 mm are too narrow for fingers between them, columns of 100 mm are wide enough.
+    // Rows 60 mm apart are too close together for fingers between them, columns 100 mm apart are not.
     let narrow = [100.0, 60.0];
     let found = check(narrow, &disc(0.052), RotationalSymmetry::None).unwrap_err().to_string();
     assert!(found.contains("expected a pitch of 100 x 79 mm"), "{found}");

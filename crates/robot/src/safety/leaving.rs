@@ -7,8 +7,8 @@ use super::limits::{CheckedMotion, SafetyLimits};
 use super::violation::Violation;
 use crate::arm_state::PERIOD_SECS;
 
-/// Largest descent that does not count as moving lower, m: a straight path in joint space is curved, and the reference
-/// may be lower than the measured position.
+/// Largest descent that does not count as moving lower, m: the tcp's path is curved if the path in joint space is
+/// straight, and the reference may be lower than the measured position.
 const ASCENT_TOLERANCE_M: f64 = 0.5e-3;
 /// Largest distance of the reference below the measured tcp while the arm rests on an object, m.
 const BELOW_MEASURED_M: f64 = 1e-3;
@@ -50,7 +50,7 @@ impl FeltBelow {
 }
 
 impl SafetyLimits {
-    /// The limits with table and workspace lowered by this distance.
+    /// The limits with table and workspace lowered by these distances.
     pub(crate) fn lowered(&self, table_m: f64, workspace_m: f64) -> Self {
         let mut limits = self.clone();
         limits.table_height_m -= table_m;

@@ -35,7 +35,8 @@ pub struct SafetyLimits {
     pub min_table_clearance_m: f64,
     /// Minimum distance between two of the arm's own bodies, m.
     pub min_self_distance_m: f64,
-    /// The limits that the robot applies to its client: an FR3's velocity limits decrease near the ends of the joints.
+    /// The limits that the robot applies to its client: an FR3's velocity limits decrease near the ends of the joints'
+    /// ranges. `None` if only the other limits are checked.
     pub robot: Option<&'static Limits>,
     /// The arm.
     pub geometry: ArmGeometry,
@@ -64,7 +65,7 @@ impl SafetyLimits {
         }
     }
 
-    /// The FR3's limits above a table at the height of the base. The tcp has the same speed limit as a Panda's.
+    /// The FR3's limits above a table at the height of the base. The speed limit of the tcp is that of a Panda.
     pub fn fr3() -> Self {
         Self { robot: Some(&Limits::FR3), ..Self::of(ArmGeometry::fr3()) }
     }
@@ -92,14 +93,15 @@ impl CheckedMotion {
         self.trajectory.end()
     }
 
-    /// Positions (rad), velocities (rad/s) and accelerations (rad/s²) at a time; at rest before the start and after the end.
+    /// Positions (rad), velocities (rad/s) and accelerations (rad/s²) at a time; at rest before the start and after the
+    /// end.
     pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
         self.trajectory.sample(time_secs)
     }
 }
 
-/// Relative tolerance: planned motions reach their limits exactly, and rounding and differences over a cycle exceed
-/// them slightly.
+/// Relative tolerance, for the robot's own velocity limits in rad/s: planned motions reach their limits exactly, and
+/// rounding and differences over a cycle exceed them slightly.
 const ROUNDING: f64 = 1e-3;
 
 impl SafetyLimits {

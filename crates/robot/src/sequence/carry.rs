@@ -21,7 +21,7 @@ pub(super) const SOFT_WAY_M: f64 = 0.015;
 /// Distance below the expected contact at which the compliant descent ends, m.
 pub(super) const BELOW_M: f64 = 0.010;
 
-/// The goal of the part, and the tcp before the compliant descent.
+/// The pose of the part at its place, and the pose of the tcp before the compliant descent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aim {
     pub(super) base_from_part: Isometry3<f64>,
@@ -46,7 +46,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     ) -> Steps<Aim> {
         let held =
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        // The hand opens at the place, so that the straight path is planned for the open hand.
+        // The hand opens at the place; the straight path is therefore planned for the open hand.
         self.known.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()

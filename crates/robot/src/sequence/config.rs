@@ -31,7 +31,7 @@ pub enum LookOut {
         /// Rotation about the vertical, rad; see [`camera_looking_down`].
         yaw_rad: f64,
     },
-    /// A configuration of the arm, rad: for a camera beside the robot, one outside the camera's view.
+    /// A configuration of the arm, rad: for a camera beside the robot, with the arm outside the camera's view.
     Joints(JointVector),
 }
 
@@ -41,8 +41,8 @@ pub struct GraspConfig {
     /// The poses at which pictures are taken, one after the other, until the part is found. The first must be
     /// reachable.
     pub look_outs: Vec<LookOut>,
-    /// Height of the wrist camera above the table for the second picture, m; best equal to that of the demonstration's
-    /// photo.
+    /// Height of the wrist camera above the table for pictures from above a detection, m; best equal to that of the
+    /// demonstration's photo.
     pub hover_height_m: f64,
     /// Force of each finger when closed, N.
     pub grasp_force_n: f64,
@@ -66,7 +66,7 @@ pub struct GraspConfig {
     pub height: Option<HeightMeasurement>,
     /// Obstacles in the cell besides the table: free motions are planned around them.
     pub obstacles: Vec<Obstacle>,
-    /// Radius of the part around its grasp, m: the part is also kept away from the obstacles.
+    /// Radius of the part around its grasp, m: the held part is kept away from the obstacles like the arm.
     pub part_radius_m: f64,
     /// The known shape of the part, for its distance from other parts; with `None` only its width between the fingers
     /// is used.
@@ -136,8 +136,8 @@ impl LookOut {
 }
 
 /// The pose of a camera at (x, y, `height_m`) in the base frame that points straight down. At yaw 0 the picture's up
-/// direction is the base's x and its right direction is -y; a positive yaw rotates it counter-clockwise as seen from
-/// above.
+/// direction is the base's x and its right direction is -y; a positive yaw rotates the camera counter-clockwise as seen
+/// from above.
 pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
     let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);

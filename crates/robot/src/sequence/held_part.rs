@@ -7,7 +7,7 @@ use super::config::GraspConfig;
 use crate::grasp_target::GraspTarget;
 use crate::part_shape::PartShape;
 
-/// The held part, since the hand closed.
+/// The part that the hand holds, as known when the hand closed.
 #[derive(Debug, Clone)]
 pub(super) struct HeldPart {
     /// Pose of the tcp in the frame of the part's grasp as it was detected: x along the marked line, z down.
@@ -16,7 +16,7 @@ pub(super) struct HeldPart {
     pub(super) height_m: f64,
     /// Extent of the part below the tcp, m.
     pub(super) hang_m: f64,
-    /// The known shape of the part; `None` if the detected values are impossible.
+    /// The configured or assumed shape of the part; `None` if the detected values are impossible.
     pub(super) shape: Option<PartShape>,
     /// Capsules that contain the part, in the tcp's frame.
     pub(super) in_tcp: Vec<Capsule>,

@@ -44,7 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    /// Lifts the part, as high as the arm can reach.
+    /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach so far.
     pub(super) fn lift(&mut self) -> Steps<()> {
         let start = self.robot.commanded()?;
         let base_from_tcp = self.robot.geometry().forward(&start);

@@ -110,8 +110,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// Moves the camera to above a grasp, shifted by `shift_m`. All grasps are at one place; the hand gets the
-    /// orientation of one of them, or the opposite one.
+    /// Moves the camera to above a grasp, shifted by `shift_m`. All grasps have the same position; the hand gets the
+    /// orientation of one of them, possibly with exchanged fingers.
     pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         self.look_down(grasps, shift_m, self.cell.config.hover_height_m, step)
     }

@@ -1,4 +1,4 @@
-//! Measures the height of the part with two pictures from adjacent positions during the approach.
+//! Measures the height of the part with pictures from adjacent positions before the approach.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use sdg_geometry::Angle;
@@ -15,8 +15,8 @@ use crate::perception::GraspStep;
 /// Minimum distance of the camera from the part, m: closer pictures show too little of it.
 const MIN_DISTANCE_M: f64 = 0.18;
 
-/// Fraction of the sideways distance for a picture that replaces one without the part: it is still far enough from the
-/// picture on the other side.
+/// Sideways shift of the camera for a replacement of a picture that does not show the part, as a fraction of the usual
+/// shift. The replacement is still far enough from the picture on the other side.
 const REPLACEMENT_SHIFT_SHARE: f64 = 0.5;
 
 impl<A: Arm> Sequence<'_, '_, A> {
@@ -56,9 +56,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(target)
     }
 
-    /// Takes pictures across the marked line, then along it, until two of them give a height from the surface beside
-    /// the part: on wood grain only one of the two directions does. Without such a pair, the height of the part itself
-    /// is used.
+    /// Takes pictures from positions across the marked line, then along it, until two of them give a height from the
+    /// surface beside the part: on wood grain only one of the two directions does. Without such a pair, the height of
+    /// the part itself is used.
     fn look_from_two_places(
         &mut self,
         seen: &GraspTarget,
@@ -78,8 +78,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
-        // If one of the first two pictures does not show the part, the next one is closer to it: long parts fill the
-        // picture, and reflections move.
+        // If one of the first two pictures does not show the part, the next one is taken closer to the part: long parts
+        // fill the picture, and reflections move.
         let nearer_m = REPLACEMENT_SHIFT_SHARE * half_m;
         let mut shown_at_m = None;
         for [across_m, along_m] in

@@ -4,11 +4,12 @@
 //! look ─> find ─> hover, rotated ─> find ─> above ─> straight down ─> close ─> lift ─> hold
 //!          └ detect                 └ detect └────── approach ──┘       └───────┴───────┴ the hand's width and force decide
 //! ```
-//! If the height of parts is not given, a camera on the hand takes two pictures from adjacent positions during the
-//! approach (measure.rs).
+//! With [`GraspConfig::height`], a camera on the hand also takes pictures from adjacent positions before the approach
+//! (measure.rs).
 //!
-//! Without a detection, the next picture is taken from the next look-out pose: it shows a tall part from another side,
-//! and the arm's shadows fall elsewhere. A camera beside the robot takes one picture, with the arm outside its view.
+//! Without a detection, the next picture is taken from the next look-out pose: this picture shows a tall part from
+//! another side, and the arm's shadows fall elsewhere. A camera beside the robot takes pictures only while the arm is
+//! in a look-out pose, outside the camera's view.
 //!
 //! Placing continues the sequence: carry ─> descend until contact with the place ─> open, up ─> measure with a picture
 //! where the part lies.
@@ -68,9 +69,10 @@ pub enum GraspOutcome {
 pub struct GraspReport {
     /// The outcome.
     pub outcome: GraspOutcome,
-    /// The detection of each picture, if it is above the threshold.
+    /// The accepted detection of each picture; last, the target at the part's height, if this height was to be
+    /// measured.
     pub targets: Vec<Option<GraspTarget>>,
-    /// Numbers of pictures: from look-out poses, and from above detections.
+    /// Numbers of pictures: from look-out poses, and from above the first detection.
     pub looks: [usize; 2],
     /// The hand's state after it closed.
     pub closed: Option<HandState>,
@@ -86,8 +88,9 @@ pub struct GraspReport {
 /// Grasps the part once.
 ///
 /// # Errors
-/// Errors that end the sequence: a failure of perception, and every error after which nothing moves until a person
-/// allows it. A failed grasp is not an error, even if the part stopped the arm.
+/// A failure of perception, an unreachable first look-out pose, and every error that stops the arm or loses the
+/// connection. A motion that cannot be planned, violates a limit or is blocked by an obstacle is not an error but a
+/// failed grasp.
 pub fn grasp<A: Arm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -100,7 +103,7 @@ pub fn grasp<A: Arm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// As [`grasp`], with a compliant arm, whose last descent is [`GraspConfig::soft_approach`].
+/// As [`grasp`], with a compliant arm, which descends by [`GraspConfig::soft_approach`] if that is given.
 ///
 /// # Errors
 /// As for [`grasp`].
@@ -158,7 +161,7 @@ struct Sequence<'s, 'r, A: Arm> {
 struct Cell<'s, A: Arm> {
     camera: CameraPose,
     config: &'s GraspConfig,
-    /// The compliant descent; `None` for an arm that is not compliant.
+    /// The compliant descent; `None` for an arm that is not used as a compliant one.
     touch: Option<Touch<A>>,
 }
 
@@ -169,7 +172,7 @@ struct Known {
     /// State of the hand after it closed.
     closed: Option<HandState>,
     held: Option<HeldPart>,
-    /// z of the surface under the part as measured, m.
+    /// z of the surface under the part, from the measured or given height of the part, m.
     surface_m: Option<f64>,
     /// Lying parts that must not be touched.
     lying: LyingParts,
@@ -266,7 +269,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.hold()
     }
 
-    /// z of the surface under the part, m: measured if possible, otherwise the table's given height.
+    /// z of the surface under the part, m: from the part's height if that is known, otherwise the table's height.
     fn surface_height_m(&self) -> f64 {
         self.known.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }

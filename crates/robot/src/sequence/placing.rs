@@ -1,12 +1,12 @@
 //! Puts the held part down, by contact instead of height, and checks its position with a picture.
 //!
 //! ```text
-//! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the tolerance
+//! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the limits
 //!           ▲                                                                        └ outside: grasp again,
 //!           └── aim with the part's pose in the hand ◄───────────────────────────────┘ a limited number of times
 //! ```
-//! Fingers do not hold a part along the line across which they close: some parts slide there when the fingers close.
-//! The picture measures this offset, and the next placement compensates it.
+//! The fingers do not fix a part along the marked line: some parts slide along this line when the fingers close. The
+//! picture measures this offset, and the next placement compensates it.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
@@ -102,13 +102,14 @@ pub struct PlacingReport {
     pub errors: Vec<PlaceOffset>,
 }
 
-/// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that release
-/// it, with parts assumed in all neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is
-/// given, otherwise after the part was found.
+/// Grasps the part and puts it down; repeats this if its offset is too large, see [`PlacingConfig::max_corrections`]. A
+/// cell of a tray must have room for the part and for the fingers that release it, with parts assumed in all
+/// neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is given, otherwise after the
+/// part was found.
 ///
 /// # Errors
-/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for impossible
-/// values of [`PlacingConfig::touch_down`].
+/// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for
+/// impossible values of [`PlacingConfig::touch_down`].
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -145,7 +146,8 @@ impl PlacingOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Fails if the place has no room for the part, and adds the parts that may lie around the place as obstacles.
+    /// Fails if the place has no room for the part or already contains a part. Adds the parts that may lie around the
+    /// place as obstacles.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
@@ -213,7 +215,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
-            // The hand keeps the orientation in which it released the part, because its fingers had room in it.
+            // The hand keeps the orientation in which it released the part, because there its fingers had room.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z = match self.cell.config.height {
@@ -333,8 +335,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
-/// Maximum number of symmetric view orientations: for the picture, a hand that was rotated to make room for its fingers
-/// may be unable to keep its orientation.
+/// Maximum number of orientations, equivalent by the part's symmetry, that are tried for a picture: the orientation in
+/// which the hand released the part may be out of reach at the height of the picture.
 const MAX_VIEW_TURNS: usize = 4;
 /// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;
@@ -371,8 +373,8 @@ fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceOffset)
     Isometry3::from_parts(found.translation, turn * place.rotation)
 }
 
-/// Slip of the part when the hand closed, in the part's frame: the tcp's pose at the release relative to its pose by
-/// the detection.
+/// Slip of the part when the hand closed, in the part's frame: the actual `part_from_tcp` at the release times the
+/// inverse of the detected one, reduced to x, y and the rotation about z.
 fn slip(
     place: &Isometry3<f64>,
     found: &Isometry3<f64>,

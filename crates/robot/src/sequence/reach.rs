@@ -24,7 +24,7 @@ const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 const NARROW_MARGIN_M: f64 = 0.020;
 /// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// Largest height of a contact with the table above the grasp, m.
+/// Largest height above the grasp at which a contact does not fail the approach, m: the table's height is uncertain.
 const MAX_EARLY_M: f64 = 0.010;
 
 /// A path to above a grasp, with the straight descent to it.
@@ -34,7 +34,8 @@ enum Reach {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Moves the open hand above the grasp, to the greatest height with a straight descent.
+    /// Moves the open hand above the grasp, to the first of the tried heights with a straight descent; returns this
+    /// descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.check_age()?;
         let limits = self.robot.limits();
@@ -83,8 +84,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
             let height = height.max(0.05);
             if self.is_surrounded() {
-                // Both orientations of the hand and all paths of the arm are tried; the one with the lowest cost is
-                // used.
+                // The planner tries both orientations of the hand with all configurations of the arm, and uses the
+                // fastest path that it finds.
                 let grasps = [*base_from_grasp, with_fingers_exchanged(base_from_grasp)];
                 match self.way_to(&Destination::Approached(&grasps, height)) {
                     Ok(way) => return Ok(Ok(Reach::Around(way))),

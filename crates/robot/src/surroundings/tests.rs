@@ -98,7 +98,7 @@ fn fingers_come_down_between_parts_that_lie_as_far_as_they_are_open() {
         let surroundings = Surroundings { lying: &lying, opening_m, table_clearance_m: 0.05, ..Default::default() };
         robot.plan_around(&surroundings, &Destination::Approached(&goals, 0.2), &joints)
     };
-    // The room in a tray: 20 mm of part, 20 mm of opening, 15 mm of each finger, and 2 mm.
+    // The gap of 74 mm is that of a tray: 20 mm of part, 20 mm of opening, and on each side 15 mm of finger and 2 mm.
     assert!(approach(0.040).unwrap().approach.is_some());
     let error = approach(0.060).unwrap_err().to_string();
     assert!(error.contains("the hand is") && error.contains("at (0.45, "), "{error}");

@@ -31,7 +31,7 @@ const PART_RADIUS_MM: f64 = 60.0;
 const MAX_PART_MM: f64 = 500.0;
 /// Payload of a Panda, kg.
 const MAX_LOAD_KG: f64 = 3.0;
-/// Heights of a camera above the table, mm.
+/// Smallest and largest height of a camera above the table, mm.
 const CAMERA_HEIGHTS_MM: [f64; 2] = [150.0, 1200.0];
 /// Distance of Franka's own finger tips beyond its tcp, mm.
 const FINGERTIP_MM: f64 = 9.0;

@@ -56,7 +56,7 @@
 //! at_mm = [450, -300]               # its centre
 //! size_mm = [200, 150]              # inner size, along its x and its y
 //! ```
-//! Every error names the line. This crate reads no files: it converts a text to a [`Workcell`].
+//! Every error contains the line. This crate reads no files: it converts a text to a [`Workcell`].
 
 mod error;
 mod file;

@@ -88,7 +88,7 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
                 return Err(source.error(rpy.span().start, "rpy_deg: expected with box, cylinder and capsule only"));
             }
             let onto = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &direction);
-            // For a normal that points vertically down the rotation is ambiguous; any of them is valid.
+            // For a normal along -z the rotation is ambiguous, and any such rotation is valid.
             let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
             (Shape::Plane, onto.unwrap_or_else(half_turn))
         }

@@ -1,5 +1,5 @@
-//! A robot that loses commands. Like a Panda, it continues at constant acceleration without them, and ends the motion
-//! beyond a limit.
+//! A robot that loses commands. Like a Panda, it continues at constant acceleration without a command. The tests
+//! compare its reference with the limits, beyond which a Panda would end the motion.
 
 use super::*;
 use crate::safety::{CheckedMotion, SafetyLimits};
@@ -141,7 +141,7 @@ fn a_line_that_loses_a_third_of_the_commands_keeps_to_the_limits() {
         assert!(robot.is_within_limits(), "seed {seed}: {:?}", robot.max_shares);
         assert_ends_at(&robot, &motion);
     }
-    // At constant acceleration the robot continues as commanded, and nothing has to be corrected.
+    // Where the trajectory's acceleration is constant, the robot continues as commanded, and nothing is corrected.
     assert!(num_corrections > 500, "{num_corrections}");
 }
 

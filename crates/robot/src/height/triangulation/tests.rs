@@ -62,11 +62,11 @@ fn pictures_that_tell_no_height_are_refused() {
     assert_eq!(why, "expected two pictures from places at least 80 mm apart sideways, found 0.0 mm");
     assert!(refused(&at(0.5, 0.3), &at(0.579, 0.3)).ends_with("found 79.0 mm"));
     assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), 0.0).is_ok());
-    // A vertical distance of one metre is not a sideways distance.
+    // A vertical distance of 0.6 m is not a sideways distance.
     assert!(refused(&at(0.5, 0.3), &at(0.5, 0.9)).contains("at least 80 mm apart"));
     // Seen from far away, lines of sight are nearly parallel.
     assert!(refused(&at(0.45, 1.2), &at(0.55, 1.2)).starts_with("expected lines of sight whose slopes differ"));
-    // Lines of sight that cross one metre above the table, above the cameras: the part appears to move farther than the
+    // Lines of sight that cross 0.75 m above the table, above the cameras: the part appears to move farther than the
     // camera.
     let (mut one, mut other) = (at(0.44, 0.3), at(0.56, 0.3));
     (one.middle_m.x, other.middle_m.x) = (0.40, 0.60);

@@ -53,7 +53,8 @@ fn the_tcp_has_limits_of_its_own() {
     let trajectory = straight_down(0.20);
     let planned = CartesianLimits::panda().scaled(0.2, 0.1, 0.05).unwrap();
     let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
-    // The path is straight only between waypoints: sampled at 1 ms, its third derivative jumps at them.
+    // The path's third derivative jumps at its waypoints, so that the jerk from samples at 1 ms exceeds the planned
+    // one.
     let mut roomy = planned;
     roomy.jerk_m_s3 = 6500.0;
     limits(roomy).check(trajectory.clone()).unwrap();
@@ -135,14 +136,14 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
     SafetyLimits::default().check(hard.clone()).unwrap();
     let refused = SafetyLimits::fr3().check(hard).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "acceleration", joint: 7, .. }), "{refused}");
-    // To the end of joint 1's range, slowly and fast.
+    // Nearly to the end of an FR3's range of joint 1, slowly and fast.
     let near_the_end = |scale| to([2.74, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], scale).unwrap();
     SafetyLimits::fr3().check(near_the_end(0.1)).unwrap();
     let refused = SafetyLimits::fr3().check(near_the_end(0.6)).unwrap_err();
     assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
 }
 
-/// The limits of an arm's geometry are those that the robot applies to its client.
+/// The limits of an arm's geometry are those that the robot applies to its client, except for a lower speed of the tcp.
 #[test]
 fn geometry_and_protocol_have_the_same_limits() {
     for (limits, velocity_m_s) in [(SafetyLimits::default(), 2.0), (SafetyLimits::fr3(), 3.0)] {

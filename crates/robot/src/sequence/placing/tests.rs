@@ -266,7 +266,7 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
     let error = ended.unwrap_err();
     assert!(!error.latches() && error.to_string().contains("expected a pitch of 80 x 47 mm"), "{error}");
     assert!(cell.arm.actions().is_empty());
-    // Without the part's outline: after the part was found, and before it is grasped.
+    // Without the part's outline, the tray is refused after the part was found and before it is grasped.
     let report = run(&mut cell, &config(), &narrow, &placing);
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");
