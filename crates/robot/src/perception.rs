@@ -124,7 +124,7 @@ impl fmt::Display for GraspStep {
 
 /// Observes the steps. An observer may know more than the arm: a simulation knows the part's true pose.
 pub trait StepObserver<A: Arm> {
-    /// Called before [`GraspStep::Hold`], not before other steps.
+    /// Called before each step, and again before [`GraspStep::Detect`] if the part's height is to be measured.
     ///
     /// # Errors
     /// An error ends the sequence.

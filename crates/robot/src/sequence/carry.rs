@@ -44,6 +44,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         opening_m: f64,
         slip: &Isometry3<f64>,
     ) -> Steps<Aim> {
+        self.begin(GraspStep::Carry)?;
         let held =
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         // The hand opens at the place; the straight path is therefore planned for the open hand.
@@ -150,6 +151,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Carry, &hand)?;
+        self.begin(GraspStep::PutDown)?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
         let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
         let motion = fails_at(GraspStep::PutDown, planned)?;

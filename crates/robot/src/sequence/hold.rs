@@ -26,6 +26,7 @@ const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Closes the hand on the part.
     pub(super) fn close(&mut self, target: &GraspTarget) -> Steps<()> {
+        self.begin(GraspStep::Close)?;
         self.robot.start_hand(HandCommand::Grasp {
             width_m: target.jaw_width_m,
             speed_m_s: CLOSING_SPEED_M_S,
@@ -46,6 +47,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach so far.
     pub(super) fn lift(&mut self) -> Steps<()> {
+        self.begin(GraspStep::Lift)?;
         let start = self.robot.commanded()?;
         let base_from_tcp = self.robot.geometry().forward(&start);
         let mut lift_m = self.cell.config.lift_m;
@@ -87,7 +89,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Holds the part still for a while.
     pub(super) fn hold(&mut self) -> Steps<()> {
-        self.observer.before(self.robot.arm(), GraspStep::Hold)?;
+        self.begin(GraspStep::Hold)?;
         self.robot.wait(self.cell.config.hold_secs)?;
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Hold, &hand)

@@ -22,6 +22,7 @@ const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes pictures from one look-out pose after the other until the part is found.
     pub(super) fn look_around(&mut self) -> Steps<GraspTarget> {
+        self.begin(GraspStep::Detect)?;
         let config = self.cell.config;
         let table_height_m = self.robot.limits().table_height_m;
         let mut looks = 0;
@@ -47,6 +48,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Takes a picture from above the first detection: errors are smaller near the centre of the picture.
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
+        self.begin(GraspStep::Hover)?;
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
             match self.hover(&[first.base_from_tcp], shift_m, GraspStep::Hover) {

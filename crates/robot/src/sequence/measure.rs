@@ -23,6 +23,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Measures the part's height, if that is configured; returns the grasp at that height.
     pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
         let Some(measurement) = self.cell.config.height else { return Ok(*seen) };
+        self.begin(GraspStep::Detect)?;
         let mut report = HeightReport::default();
         let measured = self.look_from_two_places(seen, &measurement, &mut report);
         let measured = match measured {

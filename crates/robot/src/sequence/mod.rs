@@ -274,6 +274,11 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.known.surface_m.unwrap_or(self.robot.limits().table_height_m)
     }
 
+    /// Reports to the observer that a step begins.
+    fn begin(&mut self, step: GraspStep) -> Steps<()> {
+        Ok(self.observer.before(self.robot.arm(), step)?)
+    }
+
     /// Reports a finished step to the observer, which may fail the step with a reason.
     fn passed(&mut self, step: GraspStep) -> Steps<()> {
         match self.observer.after(self.robot.arm(), step)? {

@@ -252,6 +252,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Opens the hand and moves up; returns `part_from_tcp`, the tcp's pose in the part's frame by the detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
+        self.begin(GraspStep::Release)?;
         let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
         self.robot.finish_hand()?;
@@ -293,6 +294,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         base_from_part: &Isometry3<f64>,
         placing: &PlacingConfig,
     ) -> Steps<Option<GraspTarget>> {
+        self.begin(GraspStep::Check)?;
         let turns_rad = same_turns_rad(placing.symmetry);
         let num_skipped = turns_rad.len().div_ceil(MAX_VIEW_TURNS);
         let grasps: Vec<Isometry3<f64>> = turns_rad

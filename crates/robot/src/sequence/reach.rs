@@ -37,6 +37,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Moves the open hand above the grasp, to the first of the tried heights with a straight descent; returns this
     /// descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
+        self.begin(GraspStep::Approach)?;
         self.check_age()?;
         let limits = self.robot.limits();
         let lowest =

@@ -44,6 +44,8 @@ def over_ros(sdg, cell, model, part, seed, domain):
         reader.join(5)
     lifted = sum("lifted" in line for line in said) > sum("down" in line for line in said)
     held = bool(answer and answer.success)
+    if held:
+        check(answer.step == "hold", f"the last step of a grasp is hold, found {answer.step}")
     # Without an answer, the node's lines give the reason.
     words = f"{answer.step}: {answer.message}" if answer else f"no answer in {secs:.0f} s; the node said {node.lines[-4:]}"
     return held, lifted, words

@@ -148,6 +148,28 @@ fn a_part_lies_where_it_was_to_lie() {
     }
 }
 
+/// Records the steps that begin.
+struct Begun(Vec<GraspStep>);
+
+impl StepObserver<Cell> for Begun {
+    fn before(&mut self, _arm: &mut Cell, step: GraspStep) -> Result<()> {
+        self.0.push(step);
+        Ok(())
+    }
+}
+
+#[test]
+fn an_observer_is_called_before_each_step() {
+    use GraspStep::{Approach, Carry, Check, Close, Detect, Hold, Lift, PutDown, Release};
+    let mut cell = cell(Isometry3::identity());
+    let mut begun = Begun(Vec::new());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let (config, goal, placing) = (config(), tray().goal(1).unwrap(), PlacingConfig::default());
+    grasp_and_place(&mut robot, &mut Truth, &mut begun, camera, &config, &goal, &placing).unwrap();
+    assert_eq!(begun.0, [Detect, Approach, Close, Lift, Hold, Carry, PutDown, Release, Check]);
+}
+
 #[test]
 fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
     let slide = planar(0.005, 0.001, 0.08);
