@@ -19,8 +19,8 @@ pub type OpenProject = Box<dyn Fn(&Path) -> std::result::Result<Session, Teacher
 
 /// The folder and list for choosing and creating projects.
 pub struct Start {
-    /// Recently opened projects.
-    pub recent: RecentProjects,
+    /// The list of recently opened projects; `None` if the user has no home directory.
+    pub recent: Option<RecentProjects>,
     /// Folder for new projects.
     pub folder: PathBuf,
     /// Opens the chosen project.
@@ -105,7 +105,7 @@ impl Desk {
     /// Unknown project; the project cannot be opened; another project is open.
     pub fn open(&self, id: &str) -> Result<FirstView> {
         self.take(|start| {
-            let project = start.recent.list().into_iter().find(|project| id_of(project) == id);
+            let project = start.recent_projects().into_iter().find(|project| id_of(project) == id);
             let project = project.ok_or(Error::Busy("this project is not there any more: load the page again"))?;
             (start.open)(&project.path).map_err(Error::Teacher)
         })
@@ -154,9 +154,13 @@ fn id_of(project: &RecentProject) -> String {
 }
 
 impl Start {
+    fn recent_projects(&self) -> Vec<RecentProject> {
+        self.recent.as_ref().map(RecentProjects::list).unwrap_or_default()
+    }
+
     fn view(&self) -> StartView {
         let shown = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
-        let recent = self.recent.list().into_iter().map(|project| RecentView {
+        let recent = self.recent_projects().into_iter().map(|project| RecentView {
             id: id_of(&project),
             name: label_of(&project.path).unwrap_or_else(|| file_name(&project.path)),
             path: shown(&project.path),

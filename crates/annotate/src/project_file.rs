@@ -210,6 +210,10 @@ impl ProjectFile {
         }
         if place.is_folder {
             file.add_new(folder, is_new)?;
+            // A missing photo may come back; until then, no picture replaces it.
+            if gone.photos.is_empty() {
+                file.choose_only_photo();
+            }
         }
         Ok((file, gone))
     }
@@ -245,13 +249,16 @@ impl ProjectFile {
             // Only the user knows which of them is the photo; until it is chosen, none is added.
             self.removed.extend(self.tried.drain(..).map(|tried| tried.file));
         }
-        // Without a photo, the first picture that may show the part becomes one: the only picture of a new folder.
+        Ok(())
+    }
+
+    /// Without a photo, the first picture that may show the part becomes one: the only picture of a new folder.
+    fn choose_only_photo(&mut self) {
         if self.photos.is_empty()
             && let Some(first) = self.tried.iter().position(|tried| !tried.absent)
         {
             self.photos.push(self.tried.remove(first).file);
         }
-        Ok(())
     }
 
     /// Whether the project only consists of a photo, which needs no file.
@@ -323,8 +330,8 @@ mod tests {
         fs::remove_file(at("b.png")).unwrap();
         let (again, gone) = open(folder.path());
         assert_eq!(gone, ["b.png"]);
-        // Removed pictures stay removed, and a picture known not to show the part is not a photo of it.
-        assert_eq!((again.photos, &again.tried), (vec!["d.png".to_owned()], &file.tried));
+        // Removed pictures stay removed, and no picture takes the place of a missing photo.
+        assert_eq!((again.photos.len(), again.tried.len(), &again.tried[0]), (0, 2, &file.tried[0]));
     }
 
     #[test]

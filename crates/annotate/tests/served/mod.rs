@@ -246,7 +246,7 @@ impl Served {
             noted.note(path)?;
             Ok(Session::open(&options, Arc::new(InPlace))?)
         };
-        let start = Start { recent, folder: folder.path().to_owned(), open: Box::new(open) };
+        let start = Start { recent: Some(recent), folder: folder.path().to_owned(), open: Box::new(open) };
         Self::serve(folder, Server::bind_start(start, 0, None).unwrap())
     }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow};
 use nalgebra::Point2;
 use sdg_annotate::{
-    CameraPictures, LiveOptions, OpenProject, RecentProjects, Server, Session, SessionOptions, SizeCheck, Start,
+    CameraPictures, LiveOptions, OpenProject, Server, Session, SessionOptions, SizeCheck, Start,
 };
 use sdg_camera::{Address, OpenOptions, PixelFrame};
 use sdg_files::{FileError, WriterLock};
@@ -45,7 +45,6 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
     let camera = camera.map(|camera| (camera, args.camera.heights_m()));
     let token = args.token_file.as_deref().map(sdg_annotate::token_of_file).transpose()?;
-    let recent = recent::projects();
     let server = if args.images.is_empty() && args.from.is_none() {
         if args.out.is_some() || !args.trial_pictures.is_empty() {
             return Err(Usage(
@@ -54,8 +53,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             .into());
         }
         let start = Start {
-            // Without a home directory, `note` writes no list, so that this file does not exist and the list is empty.
-            recent: recent.unwrap_or_else(|| RecentProjects::at(".sdg-recent-projects.json".into())),
+            recent: recent::projects(),
             folder: PathBuf::new(),
             open: opener(preset, camera),
         };
