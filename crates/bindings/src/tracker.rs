@@ -12,7 +12,7 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
 use crate::threads::{check_process, on_threads};
 
-/// A tracker for one camera's frames; searches run on a separate thread.
+/// A tracker for one camera's frames; searches run on a separate thread, or on the caller's with `search_frames`.
 pub struct Tracker {
     perception: Arc<Perception>,
     tracker: LiveTracker,

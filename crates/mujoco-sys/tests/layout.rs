@@ -8,8 +8,8 @@ use std::process::Command;
 
 use sdg_mujoco_sys::*;
 
-/// `(C expression, value in the bindings)` of each struct's size and of the offsets of some of its
-/// fields, from near its start to near its end.
+/// Lists `(C expression, value in the bindings)` for the size of each struct, and for the offsets of some fields
+/// between its start and its end.
 macro_rules! layout {
     ($($name:ident { $($field:ident),* $(,)? })*) => {
         vec![$(

@@ -1,4 +1,4 @@
-//! The square around a detected box that is the network's input.
+//! The network's input: the square around a detected box.
 //!
 //! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part: a
 //! bar at 30° in a wide box would appear at another angle, with an error that depends on the angle itself.
@@ -97,9 +97,9 @@ impl CropWindow {
     }
 }
 
-/// `f32::floor`, which is a call into the C library if the target has no instruction for it.
+/// `f32::floor` without the call into the C library that targets without such an instruction need.
 fn floor(value: f32) -> f32 {
-    // Whole numbers up to this value are exact.
+    // Up to this value, the conversion to i32 and back is exact.
     if value.abs() > 8e6 {
         return value.floor();
     }
@@ -115,8 +115,8 @@ fn rounded(value: f32) -> u8 {
 
 /// The colour between four pixels, whose centres are at half-integers; [`OUTSIDE`] beyond the image.
 ///
-/// The pretrained weights depend on this order of the sum: `sdg-shape`'s sampling rounds differently and stops at the
-/// border.
+/// The pretrained weights depend on this order of the sum. `sdg-shape`'s sampling cannot replace it: it rounds
+/// differently and stops at the border.
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (width, height) = (image.width() as i32, image.height() as i32);
     let (left, top) = (floor(x - 0.5), floor(y - 0.5));

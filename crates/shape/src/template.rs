@@ -14,12 +14,13 @@ use crate::sightings::FIRST_REACH;
 
 /// Minimum length of the longer side of an outline's box, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
-/// Smallest extent of the part at the finest level (a smaller part is read at full resolution) and at the coarsest, in
-/// level pixels; the extent is less than twice as large. Chosen by hand, not measured.
+/// Minimum extent of the part at the finest level, in level pixels; a smaller part is read at full resolution. Chosen
+/// by hand, not measured.
 const FINEST_EXTENT: f64 = 400.0;
+/// Minimum extent of the part at the coarsest level, in level pixels. Chosen by hand, not measured.
 const COARSEST_EXTENT: f64 = 32.0;
-/// If less than this share of the template is inside the image, it is scored as if this share were.
-/// Chosen by hand, not measured.
+/// The score is divided by the share of the template inside the image, but by at least this value. Chosen by hand, not
+/// measured.
 const MIN_VISIBLE: f64 = 0.6;
 
 /// The edges of one demonstrated part, ready to be compared with images.
@@ -53,7 +54,7 @@ impl ShapeTemplate {
     /// Reads the part's edges from the demonstration.
     ///
     /// # Units and frames
-    /// `outline` is in pixels of `image`. A box is accepted as an outline, but a less exact one: the
+    /// `outline` is in pixels of `image`. A box is accepted as an outline, but is less exact: the
     /// background's edges inside it count as the part's.
     ///
     /// # Errors
@@ -107,7 +108,7 @@ impl ShapeTemplate {
                 if levels.is_empty() {
                     return Err(ShapeError::TooFewEdges { expected: MIN_POINTS, found: points.len() });
                 }
-                // Coarser levels only help starts with larger errors.
+                // Coarser levels are needed only for initial poses with larger errors.
                 break;
             }
             let lanes = PointLanes::new(&points);
@@ -144,14 +145,14 @@ impl ShapeTemplate {
     }
 }
 
-/// How a level is read: fast for the grid of poses, exact during the climb.
+/// How a level is read: `Nearest` is fast, for the grid of poses; `Bilinear` is exact, for hill climbing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LevelSampling {
     Nearest,
     Bilinear,
 }
 
-/// One template level over the image level of the same resolution.
+/// The image level that has the resolution of a template level.
 pub(crate) struct MatchedLevel<'a> {
     pub(crate) image_level: &'a GradientLevel,
     /// Image pixels per pixel of `image_level`.
@@ -159,8 +160,8 @@ pub(crate) struct MatchedLevel<'a> {
 }
 
 impl TemplateLevel {
-    /// The level of the picture with the resolution of a pose, readable at all poses that differ by at most `limits`
-    /// (px, px, rad, ln scale).
+    /// The image level whose resolution matches this level at the pose `start`. It can be read at all poses that differ
+    /// from `start` by at most `limits` (px, px, rad, ln scale).
     pub(crate) fn matched_level<'a>(
         &self,
         field: &'a GradientField,

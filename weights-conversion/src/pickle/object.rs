@@ -1,4 +1,4 @@
-//! The objects of the machine: values, and an arena of objects.
+//! The data of the pickle machine: values, and an arena of objects.
 
 use crate::element::ElementType;
 use crate::error::Result;
@@ -68,7 +68,7 @@ pub(crate) enum Object {
     Array(Option<Box<StoredTensor>>),
     Storage(Box<StorageRef>),
     Tensor(Box<TensorRef>),
-    /// An object that is not a weight.
+    /// A numpy scalar; no weight depends on one.
     Other,
 }
 

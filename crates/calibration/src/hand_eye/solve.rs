@@ -1,4 +1,4 @@
-//! The minimum over all pictures; includes the robot's errors if the reprojection error shows them.
+//! Minimises the reprojection error over all pictures; also estimates the robot's errors if it is too large.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{Mount, PinholeCamera};
@@ -14,13 +14,13 @@ use crate::pose::BoardPose;
 /// Initially assumed errors of a robot along and about an axis, in metres and radians; their ratio is kept. From issue
 /// 16, which gives the noise of an arm.
 pub(super) const ROBOT_SIGMA: [f64; 2] = [0.0001, 0.000_872_665];
-/// Largest ratio of the squared error to the squared error expected for exact robot poses. With 15 pictures this ratio
-/// has a standard deviation of 0.16.
+/// Largest increase of the squared error over that of separate board poses, as a multiple of the increase expected for
+/// exact robot poses. With 15 pictures this ratio has a standard deviation of 0.16.
 const MAX_EXCESS: f64 = 1.5;
 /// Robot errors, as a multiple of [`ROBOT_SIGMA`], above which poses and pictures do not match: 3 mm and 1.5 degrees.
 pub(super) const MAX_ROBOT_SCALE: f64 = 30.0;
-/// Robot errors, as a multiple of [`ROBOT_SIGMA`], from which other readings of the poses are tried: 0.15 mm and 0.075
-/// degrees. One pose of 15 with an error of 10 mm causes as much.
+/// Robot errors, as a multiple of [`ROBOT_SIGMA`], from which the poses are suspected and other conventions for them
+/// are tried: 0.15 mm and 0.075 degrees. One pose of 15 with an error of 10 mm causes as much.
 pub(super) const SUSPECT_ROBOT_SCALE: f64 = 1.5;
 /// Robot errors, as multiples of [`ROBOT_SIGMA`], from which the search restarts if it found no minimum.
 const FURTHER_SCALES: [f64; 2] = [5.0, 25.0];
@@ -45,7 +45,7 @@ pub(super) struct Solved<'a> {
     pub(super) minimum: Minimum<Bundle<'a>, NUM_SHARED>,
     /// Robot errors as a multiple of [`ROBOT_SIGMA`]; `None` if robot poses count as exact.
     pub(super) robot_scale: Option<f64>,
-    /// Number of equations minus number of parameters.
+    /// Six per picture minus the number of shared parameters.
     pub(super) freedom: f64,
     corner_sigma_px: f64,
     pub(super) board_rms_px: f64,
@@ -105,8 +105,8 @@ impl<'a> Solved<'a> {
             let sigma = ROBOT_SIGMA.map(|sigma| scale * sigma / corner_sigma_px);
             minimise(from.with_robot_sigma(sigma)).ok_or(CalibrationError::NoPose)
         };
-        // The assumed robot errors are correct if the squared error equals the number of remaining equations. The
-        // squared error decreases as the assumed errors grow.
+        // The assumed robot errors are correct if the increase of the squared error, in units of the variance, equals
+        // `freedom`. The squared error decreases as the assumed errors grow.
         let weighed = |first: f64, from: &Bundle<'a>| {
             let mut scale = first;
             let mut minimum = solve(scale, from)?;
@@ -158,7 +158,7 @@ impl<'a> Solved<'a> {
         self.corner_sigma_px * self.corner_sigma_px
     }
 
-    /// The solution `X` without each picture.
+    /// The solutions `X` with one picture left out, for each picture.
     pub(super) fn without_each(&self) -> Vec<Isometry3<f64>> {
         let all = &self.minimum.at;
         (0..all.num_views())

@@ -43,7 +43,7 @@ pub struct LabelledPicture {
 }
 
 impl LabelledPicture {
-    /// Makes instances optional that are not completely in the searched region.
+    /// Makes an instance optional if it is not completely in the searched region.
     pub fn mark_outside(&mut self, searched: &BoundingBox) {
         for instance in &mut self.instances {
             let BoundingBox { x1, y1, x2, y2 } = instance.bbox;

@@ -7,9 +7,9 @@ use image::imageops::{self, FilterType};
 const GAP_PX: u32 = 6;
 const GROUND: image::Rgb<u8> = image::Rgb([28, 30, 34]);
 
-/// Arranges pictures in rows, each scaled into a cell of `cell_width` with the first picture's proportions.
+/// Arranges pictures in rows of cells. A cell is `cell_width` wide and has the first picture's proportions.
 ///
-/// Pictures of other proportions are centred in their cells. On a page, use a gallery of separate pictures, which
+/// Each picture is scaled to fit its cell, and centred in it. On a page, use a gallery of separate pictures, which
 /// adapts to the screen's width; a sheet is a single file.
 ///
 /// # Panics

@@ -51,8 +51,8 @@ const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
 const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
 
 impl Workcell {
-    /// The limits of every motion in the workcell: Franka's limits above the table, except for the hand's rotation,
-    /// which is faster at the pace of rehearsals.
+    /// The limits of every motion in the workcell: Franka's limits over a table at the base's height, but higher limits
+    /// for the hand's rotation, as the pace of rehearsals requires.
     pub fn safety_limits() -> SafetyLimits {
         let mut cartesian = CartesianLimits::panda();
         cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;

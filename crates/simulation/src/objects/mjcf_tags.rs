@@ -1,4 +1,4 @@
-//! The tags of an MJCF text and their attributes, changed in place.
+//! Reads and changes the tags of an MJCF text and their attributes; keeps the rest of the text.
 
 /// One tag: its name, and its attributes in their order.
 pub(super) struct Tag {
