@@ -221,6 +221,9 @@ pub struct Figures {
     /// Number of unmarked parts detected in the photos; they were removed from the samples.
     #[serde(default)]
     pub others_in_photo: usize,
+    /// Numbers of the photos whose grasp points in another direction than that of photo 1.
+    #[serde(default)]
+    pub turned_photos: Vec<usize>,
 }
 
 /// Number of the user's pictures without the part that are refused.

@@ -156,6 +156,7 @@ fn page_figures(figures: &HeldBackFigures) -> Figures {
         error: figures.median_distance().map(|(error, unit)| (error, unit.to_owned())),
         error_degrees: figures.median_errors().map(|[_, degrees]| degrees),
         others_in_photo: figures.others_in_photo(),
+        turned_photos: figures.turned().iter().map(|turned| turned.photo).collect(),
     }
 }
 

@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 
 use crate::support::{Folder, pendulum_twice, sdg, shipped, stdout, taught_pendulum};
 use image::{ImageFormat, Rgb, RgbImage};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// A folder with the lever's photo and marks, and a model S taught from them.
 fn taught(folder: &Folder) -> String {
@@ -219,6 +219,32 @@ fn another_of_the_part_in_the_photo_does_not_count_as_wrong() {
     assert_eq!(held_back["others_in_photo"], 1, "{held_back}");
     // With the other part in the background, every sample has a wrong detection.
     assert!(held_back["wrong"].as_u64().unwrap() <= 2, "{held_back}");
+}
+
+#[test]
+fn a_second_photo_whose_grasp_has_its_ends_swapped_causes_a_warning() {
+    let folder = Folder::new();
+    let mut darker = photo();
+    darker.iter_mut().for_each(|value| *value /= 2);
+    darker.save(folder.path("second.png")).unwrap();
+    let marks = fs::read_to_string(shipped("pendulum", "annotation.json")).unwrap();
+    let swapped = marks.replace("grasp_start", "?").replace("grasp_end", "grasp_start").replace('?', "grasp_end");
+    let (second, model) = (folder.path("second.png"), folder.path("model.sdg"));
+    let first =
+        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
+    for (marks, turned) in [(&marks, json!([])), (&swapped, json!([2]))] {
+        fs::write(folder.path("second.json"), marks.replace("image.png", "second.png")).unwrap();
+        let teach = ["teach", "--model", "S", "--demo", &first, "--demo", &second, "--out", &model, "--json"];
+        let done = sdg(&teach);
+        let taught: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(taught["held_back"]["turned_photos"], turned, "{taught}");
+        let warning = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(
+            warning.contains("the grasp in photo 2 is turned by 180° against that in photo 1"),
+            turned == json!([2]),
+            "{warning}"
+        );
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use sdg_cell::Perception;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
 };
-use sdg_grasp::{GraspModel, Verification, without_unmarked_parts};
+use sdg_grasp::{GraspModel, TurnedGrasp, Verification, turned_grasps, without_unmarked_parts};
 use serde_json::{Value, json};
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
@@ -68,6 +68,8 @@ pub struct HeldBackFigures {
     photo_px: f64,
     /// Number of unmarked parts that were detected in the photos and removed from the samples.
     others_in_photo: usize,
+    /// Photos whose grasp points in another direction than that of the first photo.
+    turned: Vec<TurnedGrasp>,
 }
 
 impl HeldBackFigures {
@@ -113,7 +115,8 @@ impl HeldBackFigures {
             Ok(judge(&tested, DEFAULT_MIN_SCORE))
         });
         let judged = judged.collect::<Result<Vec<_>>>()?;
-        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
+        let turned = turned_grasps(model, demonstrations)?;
+        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo, turned })
     }
 
     /// The reason why the model is unusable: it finds fewer than half of the parts, or accepts a detection in more than
@@ -161,6 +164,23 @@ impl HeldBackFigures {
         self.others_in_photo
     }
 
+    /// Photos whose grasp points in another direction than that of the first photo.
+    pub fn turned(&self) -> &[TurnedGrasp] {
+        &self.turned
+    }
+
+    /// A warning for each photo whose grasp points in another direction than that of the first photo.
+    pub fn warnings(&self) -> Vec<String> {
+        let warning = |turned: &TurnedGrasp| {
+            let TurnedGrasp { photo, turn_deg } = turned;
+            format!(
+                "the grasp in photo {photo} is turned by {turn_deg:.0}° against that in photo 1: unless the part looks \
+                 the same in both directions, the model turns the hand at random; mark both photos in the same direction"
+            )
+        };
+        self.turned.iter().map(warning).collect()
+    }
+
     /// A summary on one line.
     pub fn in_words(&self) -> String {
         let interval = |share: Share| {
@@ -197,6 +217,7 @@ impl HeldBackFigures {
             "false_alarms_interval": wilson_interval(self.totals.false_alarms),
             "errors": self.totals.errors,
             "others_in_photo": self.others_in_photo,
+            "turned_photos": self.turned.iter().map(|turned| turned.photo).collect::<Vec<_>>(),
         })
     }
 }
@@ -216,7 +237,7 @@ mod tests {
             false_alarms: share(false_alarms, 6),
             errors: None,
         };
-        HeldBackFigures { samples: COUNT, totals, photo_px: 1.0, others_in_photo: 0 }
+        HeldBackFigures { samples: COUNT, totals, photo_px: 1.0, others_in_photo: 0, turned: Vec::new() }
     }
 
     #[test]

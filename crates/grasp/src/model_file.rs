@@ -145,10 +145,11 @@ impl GraspModel {
             .enumerate()
             .map(|(i, marks)| {
                 let png = tensor(&file, &format!("demonstrations.{i}.cutout"), Dtype::U8)?;
-                let cutout = decode_image(png.data(), &ImageLimits::default()).map_err(|error| GraspError::Damaged {
-                    expected: "a photo of the part that can be decoded".to_owned(),
-                    found: error.to_string(),
-                })?;
+                let cutout =
+                    decode_image(png.data(), &ImageLimits::default()).map_err(|error| GraspError::Damaged {
+                        expected: "a photo of the part that can be decoded".to_owned(),
+                        found: error.to_string(),
+                    })?;
                 let mut check = CheckConfig::DEFAULT;
                 if let Some([low, high]) = facts.size_tolerance {
                     check.search.scales = low..=high;

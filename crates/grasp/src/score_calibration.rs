@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::check_config::ScoreConfig;
 use crate::network_calibration::NetworkCalibration;
 use crate::network_evidence::NetworkEvidence;
 
@@ -17,6 +18,13 @@ pub(crate) struct ScoreCalibration {
 }
 
 impl ScoreCalibration {
+    /// The calibration without any measurement.
+    pub(crate) const NEUTRAL: Self = Self {
+        network: NetworkCalibration::NEUTRAL,
+        evidence: None,
+        resemblance: ScoreConfig::DEFAULT.resemblance.neutral,
+    };
+
     /// The log-likelihood ratio of a place from the network's score there, 0 without a proposal; `None` without the
     /// network's evidence.
     pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {

@@ -244,7 +244,7 @@ fn serve_start() -> Serving {
         let options = SessionOptions { project: Some(path.to_owned()), ..SessionOptions::default() };
         Ok(Session::open(&options, Arc::new(Unwilling))?)
     };
-    let start = Start { recent, folder: folder.path().to_owned(), open: Box::new(open) };
+    let start = Start { recent: Some(recent), folder: folder.path().to_owned(), open: Box::new(open) };
     serve(folder, Server::bind_start(start, 0, Some(TOKEN)).expect("a port of this computer"))
 }
 

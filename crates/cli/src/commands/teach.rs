@@ -209,6 +209,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     if let Some(failure) = &failure {
         eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
+    for warning in figures.warnings() {
+        eprintln!("{} {warning}", Paint::stderr().text(Tone::Doubtful, "warning:"));
+    }
     for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
     }

@@ -29,6 +29,7 @@ mod start;
 pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
+mod turned;
 mod unmarked;
 
 use std::ops::ControlFlow;
@@ -41,14 +42,12 @@ use sdg_geometry::GraspLine;
 use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, ValidationRecord, first_windows, train};
 
-use crate::check_config::ScoreConfig;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Proposals, Reading};
-use crate::network_calibration::NetworkCalibration;
 use crate::network_evidence::NetworkEvidence;
 use crate::score_calibration::ScoreCalibration;
 use crate::search_window::check_region;
@@ -66,6 +65,7 @@ pub use preset::Preset;
 use side_by_side::side_by_side;
 pub use start::Start;
 use symmetry::HiddenTurns;
+pub use turned::{TurnedGrasp, turned_grasps};
 pub use unmarked::without_unmarked_parts;
 
 /// A model and the run that made it.
@@ -204,11 +204,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions) -> 
         preset: options.preset.name().to_owned(),
         network: None,
         demonstrations: taught(demonstrations, options)?,
-        score_calibration: ScoreCalibration {
-            network: NetworkCalibration::NEUTRAL,
-            evidence: None,
-            resemblance: ScoreConfig::DEFAULT.resemblance.neutral,
-        },
+        score_calibration: ScoreCalibration::NEUTRAL,
         facts: TeachingFacts {
             seed: options.seed,
             symmetry: options.symmetry,

@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
 use nalgebra::Point2;
-use sdg_annotate::{
-    CameraPictures, LiveOptions, OpenProject, Server, Session, SessionOptions, SizeCheck, Start,
-};
+use sdg_annotate::{CameraPictures, LiveOptions, OpenProject, Server, Session, SessionOptions, SizeCheck, Start};
 use sdg_camera::{Address, OpenOptions, PixelFrame};
 use sdg_files::{FileError, WriterLock};
 use sdg_grasp::Preset;
@@ -52,11 +50,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             )
             .into());
         }
-        let start = Start {
-            recent: recent::projects(),
-            folder: PathBuf::new(),
-            open: opener(preset, camera),
-        };
+        let start = Start { recent: recent::projects(), folder: PathBuf::new(), open: opener(preset, camera) };
         Server::bind_start(start, args.port, token.as_deref())?
     } else {
         let project = project(&args.images)?;
