@@ -8,7 +8,7 @@ const MAX_TURN = (20 * Math.PI) / 180;
 /** So is a hand moved by more than this share of the part's length. */
 const MAX_MOVE = 0.1;
 const MAX_NAMES = 30;
-const WORDS = { more: "more is found", less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere" };
+const WORDS = { less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere", more: "more is found" };
 
 /**
  * The change from the marks of some detections to those of others: "more" or "less" are found, or a hand is "turned"

@@ -2,7 +2,7 @@
 
 import { state } from "./store.js";
 
-export const OLD = "photos, marks, pictures without the part or the part’s symmetry have changed since";
+export const OLD = "photos, marks, pictures without the part, or the settings for symmetry or height have changed since";
 
 export const partSettings = () => ({
   symmetry: Number(document.querySelector("[name=symmetry]:checked").value),

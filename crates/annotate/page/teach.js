@@ -57,6 +57,7 @@ by("teach-form").addEventListener("submit", (event) => {
 /** The settings in the form. */
 export function teachRequest() {
   preselect();
+  preselected = true;
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
   const minutes = number("budget");
   return {

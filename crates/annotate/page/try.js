@@ -280,8 +280,7 @@ function renderJudge() {
   by("judge").hidden = !isTaught() || !(looked.length || state.camera);
   const least = state.minScore.toFixed(2);
   by("least-score-value").textContent = least;
-  // Refused detections that hardly resemble the part are not counted as candidates.
-  const places = looked.flatMap((trial) => trial.detections).filter((d) => isFound(d) || d.score >= MIN_SHOWN);
+  const places = looked.flatMap((trial) => trial.detections);
   const [above, sure] = [isFound, isAccepted].map((which) => places.filter(which).length);
   const isLow = state.minScore < MODEL_LIMIT;
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;

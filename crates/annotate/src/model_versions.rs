@@ -35,7 +35,7 @@ pub struct Version {
     pub negatives: usize,
     /// [`fingerprint`] of the teaching's inputs.
     pub material: String,
-    /// [`TeachRequest::symmetry`](crate::teacher::TeachRequest) and `fixed_height`; absent in files of earlier programs.
+    /// The settings of its [`TeachRequest`](crate::teacher::TeachRequest); `None` in files of earlier programs.
     #[serde(default)]
     pub symmetry: Option<u32>,
     #[serde(default)]
