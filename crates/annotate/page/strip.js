@@ -25,11 +25,11 @@ export function openTrialPicture(index) {
   showCurrent();
 }
 
-/** Opens the next picture of the row, or the previous one (-1). */
+/** Opens the next picture of the row, or the previous one (-1); from the camera, the picture shown before. */
 export function openNext(step) {
   const trying = state.tab === "try";
   const row = order(trying ? state.trialPictures : state.images, trying);
-  const next = row[row.indexOf(trying ? state.trial : state.current) + step];
+  const next = row[row.indexOf(trying ? state.trial : state.current) + (trying && isLive() ? 0 : step)];
   if (next !== undefined) (trying ? openTrialPicture : openImage)(next);
 }
 

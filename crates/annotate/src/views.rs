@@ -106,7 +106,7 @@ pub struct OtherView {
 pub struct VersionFound {
     /// The best score of all detections.
     pub best: f64,
-    /// The marks of the accepted ones, the best first.
+    /// The marks of the accepted ones without their outlines, the best first.
     pub accepted: Vec<Marks>,
 }
 

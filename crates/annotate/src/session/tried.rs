@@ -133,7 +133,8 @@ impl Session {
                 let found = model.detect(&pixels).map_err(Error::Teacher)?;
                 let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
                 let accepted = found.iter().filter(|one| one.is_accepted);
-                let accepted = accepted.map(|one| Marks::of_found(one, trial.picture.size)).collect();
+                let marks = |one| Marks { outline: None, ..Marks::of_found(one, trial.picture.size) };
+                let accepted = accepted.map(marks).collect();
                 Ok::<_, Error>(VersionFound { best, accepted })
             };
             let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
