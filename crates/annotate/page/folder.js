@@ -7,11 +7,15 @@ import { changed, isLive, state } from "./store.js";
 import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
+import { byName } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const dialog = by("folder");
 /** Role of a chosen picture: photo or try. */
 let wanted = "photo";
+
+/** The pictures offered for a role, by name. A removed demonstration may be a copy of a picture to try. */
+const offered = (role) => state.others.filter(({ is_tried: isTried }) => role === "photo" || !isTried).sort(byName);
 
 const isWithoutPhoto = () => !state.images.length && !state.camera;
 
@@ -63,16 +67,17 @@ export const uploadPhoto = (file) => take(async () => {
 function render() {
   const isPhoto = wanted === "photo";
   by("folder-title").textContent = isPhoto ? (state.images.length ? "Add a photo of the part" : "Which picture is the photo of the part?") : "Pictures of this folder";
-  by("folder-how").textContent = !state.others.length
+  const others = offered(wanted);
+  by("folder-how").textContent = !others.length
     ? "There is no other picture in the project’s folder."
     : isPhoto
       ? "The best one shows the part whole and alone, nothing over it. The others can be tried later."
       : "Choose those to try the model on.";
-  const all = state.others.length > 1 && !isPhoto;
+  const all = others.length > 1 && !isPhoto;
   by("folder-all").hidden = !all;
-  by("folder-all").textContent = `Add all ${state.others.length}`;
+  by("folder-all").textContent = `Add all ${others.length}`;
   by("folder-choose").hidden = !isPhoto;
-  by("folder-list").replaceChildren(...state.others.map(({ id, name }) => {
+  by("folder-list").replaceChildren(...others.map(({ id, name }) => {
     const item = document.createElement("li");
     const choose = button("", () => (isPhoto ? takePhoto(id) : takeTrials([id])));
     const picture = Object.assign(document.createElement("img"), { alt: "", loading: "lazy", src: api.otherUrl(id) });
@@ -91,7 +96,7 @@ export async function openFolder(as) {
 
 by("folder-all").addEventListener("click", () => {
   dialog.close();
-  takeTrials(state.others.map(({ id }) => id));
+  takeTrials(offered(wanted).map(({ id }) => id));
 });
 by("folder-choose").addEventListener("click", () => by("photo-input").click());
 by("photo-input").addEventListener("change", () => {
@@ -105,8 +110,9 @@ by("add-others").addEventListener("click", () => openFolder("try"));
 export function renderFolder() {
   by("choose").hidden = !isWithoutPhoto();
   by("mark-work").hidden = isWithoutPhoto() || (isLive() && state.tab === "mark");
-  by("add-others").hidden = !state.others.length;
-  by("add-others").textContent = `From this folder (${state.others.length})…`;
+  const { length } = offered("try");
+  by("add-others").hidden = !length;
+  by("add-others").textContent = `From this folder (${length})…`;
 }
 
 by("projects").addEventListener("click", async () => {

@@ -4,7 +4,7 @@ import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGrip
 import { boundsOf, boxPolygon } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
-import { openImage } from "./strip.js";
+import { openNext } from "./strip.js";
 import { isLive, isMarking, region, size, state, trialPicture } from "./store.js";
 import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 
@@ -77,8 +77,8 @@ const LOOKING = {
   f: fitOrPart,
   0: fit,
   1: actualSize,
-  n: () => openImage(state.current + 1),
-  m: () => openImage(state.current - 1),
+  n: () => openNext(1),
+  m: () => openNext(-1),
   c: toggleCamera,
   t: takePhoto,
   l: toggleLive,

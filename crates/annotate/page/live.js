@@ -6,9 +6,10 @@ import { adopt } from "./editing.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
-import { changed, isFound, isLive, state, touchedBy } from "./store.js";
+import { changed, isAccepted, isFound, isLive, isRunning, MODEL_LIMIT, state, touchedBy } from "./store.js";
 import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
+import { listText } from "./words.js";
 
 /** Interval between requests: more pictures per second than a person needs. */
 const PAUSE_MS = 60;
@@ -174,12 +175,18 @@ export function placeText({ marks, pose }) {
   return pose ? `${inPicture}\n${poseText(pose)}` : inPicture;
 }
 
+/** A detection's state in words. */
+export function foundTitle(detection) {
+  if (isAccepted(detection)) return "Found the part";
+  return isFound(detection) ? `Above the slider, below the model’s limit of ${MODEL_LIMIT.toFixed(2)}` : "Refused";
+}
+
 /** The parts that a detection's jaws touch, by their numbers in the list; empty if there are none. */
 export function touchText(detection, detections, listed) {
-  const touched = isFound(detection) ? touchedBy(detection, detections) : [];
+  const touched = isAccepted(detection) ? touchedBy(detection, detections) : [];
   if (!touched.length) return "";
   const numbers = touched.map((other) => listed.indexOf(other) + 1).sort((a, b) => a - b).map((n) => (n ? `${n}` : "another"));
-  return `Warning: the jaws would touch part${numbers.length > 1 ? "s" : ""} ${new Intl.ListFormat("en").format(numbers)}.`;
+  return `Warning: the jaws would touch part${numbers.length > 1 ? "s" : ""} ${listText(numbers)}.`;
 }
 
 /** A grasp over the table, in words. */
@@ -216,7 +223,7 @@ function cards(detections) {
     const best = detections[0];
     return [["There is nothing to grasp.", best ? `best ${best.score.toFixed(2)}` : "", ""]];
   }
-  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, placeText(d), touchText(d, detections, accepted)]);
+  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered(foundTitle(d), i, accepted.length), `score ${d.score.toFixed(2)}`, placeText(d), touchText(d, detections, accepted)]);
   if (accepted.length > MAX_TOLD) told.push([`And ${accepted.length - MAX_TOLD} more`, "", ""]);
   return told;
 }
@@ -231,7 +238,7 @@ function renderTrying() {
   const isAnswered = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
-  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
+  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : `${isRunning() ? "A model is being taught" : "Teach a model first"}: it then looks for the part here.`;
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
   const text = JSON.stringify(told);

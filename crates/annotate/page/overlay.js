@@ -1,7 +1,7 @@
 // The marks drawn over the photo. Elements are kept between frames, so that a focused handle keeps the focus.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
-import { image, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
+import { image, isAccepted, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -173,8 +173,8 @@ export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : t
 
 /** A detected grasp: drawn like a marked one, but not draggable. Returns its tag: key, text, the part's bounds on the screen, and its group. */
 function drawDetection(detection, i, count, detections) {
-  const touches = isFound(detection) && touchedBy(detection, detections).length;
-  const parent = group(`found${i}`, isFound(detection) ? (touches ? "touching" : "") : "refused");
+  const touches = isAccepted(detection) && touchedBy(detection, detections).length;
+  const parent = group(`found${i}`, isAccepted(detection) ? (touches ? "touching" : "") : "refused");
   const { outline, grasp, box } = detection.marks;
   if (outline) {
     const within = element(`found${i}/outline`, "g", { class: "outline" }, parent);
@@ -221,7 +221,7 @@ export function renderOverlay() {
     const shown = detections?.filter((d, i) => isFound(d) || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
     // Worst first, so that the best is on top.
     const tags = shown.map((d, i) => [d, i]).reverse().map(([d, i]) => {
-      if (d.refusal && !isFound(d) && state.showDifferences) drawDifferences(d.refusal, i);
+      if (d.refusal && !isAccepted(d) && state.showDifferences) drawDifferences(d.refusal, i);
       return drawDetection(d, i, shown.length, detections);
     });
     drawTags(tags.reverse());

@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
 import { clamp } from "./geometry.js";
-import { changed, isLive, state, trialPicture } from "./store.js";
+import { changed, isLive, isRunning, searchAgain, state, trialPicture } from "./store.js";
 import { toast } from "./toast.js";
 import { toPhoto, toScreen } from "./view.js";
 
@@ -30,7 +30,7 @@ async function setRegion(region) {
   by("region-error").hidden = true;
   try {
     state.region = (await api.setRegion(region)).region;
-    for (const trial of [...state.trialPictures, state.live]) Object.assign(trial, { detections: null, failed: null });
+    searchAgain({ compares: false });
     toast(region ? "Only this part of the picture is searched now." : "All of the picture is searched now.");
   } catch (error) {
     by("region-error").hidden = false;
@@ -115,16 +115,15 @@ export function renderRegion() {
   by("region-draw").setAttribute("aria-pressed", String(isDrawing));
   by("region-all").hidden = !region;
   const isOther = region?.picture && String(region.picture) !== String(size);
-  by("region-text").textContent = isDrawing
+  const off = isRunning() && "A model is being taught: the region can be changed afterwards.";
+  by("region-text").textContent = off || (isDrawing
     ? "Drag over the region of the picture to be searched."
     : isOther
       ? `It is for pictures of ${region.picture.join(" × ")} pixels; this one has ${size.join(" × ")}.`
       : region
         ? "Parts are found if their grasp and at least half of the part are in the frame. Models taught later search there, too."
-        : "The whole picture is searched. A smaller region is faster, but parts outside it are not found.";
-  for (const id of ["region-draw", "region-all", "region-set"]) {
-    offBecause(by(id), ["running", "stopping"].includes(state.teaching.status) && "A model is being taught");
-  }
+        : "The whole picture is searched. A smaller region is faster, but parts outside it are not found.");
+  for (const control of by("region-form").elements) offBecause(control, off);
   const now = JSON.stringify([region, size]);
   if (now === shown) return;
   if (region) by("region-fold").open = true;

@@ -6,6 +6,7 @@ import { adopt, save } from "./editing.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
+import { listText } from "./words.js";
 
 const banner = document.getElementById("lost");
 /** Intervals of checking the server: while it answers, and while it does not. */
@@ -113,7 +114,7 @@ window.addEventListener("pagehide", () => keep());
 export function renderUnsaved() {
   const unsaved = state.images.filter(({ saved }) => saved.by_disk);
   const [first] = unsaved;
-  const names = new Intl.ListFormat("en").format(unsaved.slice(0, 3).map(({ name }) => name).concat(unsaved.length > 3 ? [`${unsaved.length - 3} more`] : []));
+  const names = listText(unsaved.map(({ name }) => name), 3);
   const text = first ? `Not saved: the marks on ${names} (${first.saved.why}). They stay on this page; saving is tried again until it succeeds.` : "";
   const line = document.getElementById("unsaved");
   line.hidden = !first;

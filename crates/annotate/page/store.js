@@ -14,7 +14,7 @@ export const state = {
   /** Photos of the part: the server's view of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,
-  /** Pictures to try, each with its `detections` once searched. */
+  /** Pictures to try, each with its `detections` once searched, and those of the model before. */
   trialPictures: [],
   trial: 0,
   tab: "mark",
@@ -66,10 +66,23 @@ export const trialPicture = () => state.trialPictures[state.trial];
 /** Whether a photo has all the marks that a teaching needs. */
 export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box || outline) && grasp);
 export const isAnyMarked = () => state.images.some(isComplete);
-/** Whether a detection is accepted at the chosen minimum score. */
+/** From this score on the model itself accepts a detection. */
+export const MODEL_LIMIT = 0.5;
+/** Whether a detection reaches the chosen minimum score. */
 export const isFound = (detection) => detection.score >= state.minScore;
+/** Whether it also reaches the model's limit. */
+export const isAccepted = (detection) => isFound(detection) && detection.score >= MODEL_LIMIT;
 /** The accepted detections of a picture whose parts are touched by the jaws of one of them. */
-export const touchedBy = (detection, detections) => detection.touches.map((i) => detections[i]).filter((other) => other && isFound(other));
+export const touchedBy = (detection, detections) => detection.touches.map((i) => detections[i]).filter((other) => other && isAccepted(other));
+/** Whether a model is being taught. */
+export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
+
+/** Discards all detections, so that the pictures are searched again; `before` keeps them, to compare another model's. */
+export function searchAgain({ compares }) {
+  for (const target of [...state.trialPictures, state.live]) {
+    Object.assign(target, { before: compares ? target.detections : null, detections: null, failed: null });
+  }
+}
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

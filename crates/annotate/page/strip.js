@@ -3,11 +3,12 @@
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
 import { toast } from "./toast.js";
-import { changed, image, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
-import { show } from "./view.js";
+import { changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
+import { replacePicture, show } from "./view.js";
 
 const strip = document.getElementById("strip");
 const empty = document.getElementById("empty");
+const photo = document.getElementById("photo");
 
 /** Opens another photo of the part for marking. */
 export function openImage(index) {
@@ -22,6 +23,14 @@ export function openTrialPicture(index) {
   if (index < 0 || index >= state.trialPictures.length) return;
   Object.assign(state, { trial: index, tryingLive: false });
   showCurrent();
+}
+
+/** Opens the next picture of the row, or the previous one (-1); from the camera, the picture shown before. */
+export function openNext(step) {
+  const trying = state.tab === "try";
+  const row = order(trying ? state.trialPictures : state.images, trying);
+  const next = row[row.indexOf(trying ? state.trial : state.current) + (trying && isLive() ? 0 : step)];
+  if (next !== undefined) (trying ? openTrialPicture : openImage)(next);
 }
 
 /** The server's view of all pictures to try and of the models, after one was removed or restored. */
@@ -71,12 +80,21 @@ function onStage() {
   return [trying ? api.trialPictureUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`];
 }
 
-/** Shows the content of the current step. */
+/** The size of the picture to try on the stage; empty if something else is shown. */
+let triedSize = "";
+
+/** Shows the content of the current step. From one picture to try to another of its size, the view is kept. */
 export function showCurrent() {
   const shown = onStage();
-  document.getElementById("photo").hidden = !shown;
+  photo.hidden = !shown;
   empty.hidden = Boolean(shown);
-  if (shown) show(...shown);
+  const size = shown && state.tab === "try" && !isLive() ? String(shown[1]) : "";
+  const isKept = size && size === triedSize;
+  triedSize = size;
+  if (isKept) {
+    replacePicture(shown[0]);
+    photo.alt = shown[2];
+  } else if (shown) show(...shown);
   else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : state.tab === "try" ? "Drop pictures of the table here, or add them on the side." : "Drop a photo of the part here, or choose it on the side.";
   changed();
 }
@@ -87,10 +105,12 @@ function words(entry, trying) {
     return (box || outline) && grasp ? "✓ marked" : box || outline || grasp ? "half marked" : "not marked";
   }
   if (entry.became !== null) return "✓ added";
-  if (entry.is_absent) return "✓ part not here";
+  if (entry.is_absent) return "✓ not here";
   if (entry.detecting) return "looking…";
   if (!entry.detections) return "not tried";
-  const count = entry.detections.filter(isFound).length;
+  const found = entry.detections.filter(isFound);
+  const count = found.length;
+  if (!found.every(isAccepted)) return `${count} above ${state.minScore.toFixed(2)}`;
   return count ? `${count} found` : "nothing found";
 }
 
@@ -102,6 +122,16 @@ function order(entries, trying) {
   const rank = ({ detections }) => (!detections ? 2 : detections.some(isFound) ? 1 : 0);
   const key = state.sortedBy === "score" ? best : rank;
   return numbers.sort((a, b) => key(entries[a]) - key(entries[b]) || a - b);
+}
+
+/** Scrolls the row to the current picture, once after each change of it. */
+let scrolledTo = "";
+function scrollTo(item, key) {
+  if (key === scrolledTo) return;
+  scrolledTo = key;
+  const [at, frame] = [item, strip].map((element) => element.getBoundingClientRect());
+  if (at.left < frame.left) strip.scrollLeft += at.left - frame.left;
+  else if (at.right > frame.right) strip.scrollLeft += at.right - frame.right;
 }
 
 export function renderStrip() {
@@ -131,6 +161,7 @@ export function renderStrip() {
     name.textContent = entry.name;
     word.textContent = words(entry, trying);
     item.firstChild.setAttribute("aria-current", String(i === current && !isLive()));
+    if (i === current && !strip.hidden) scrollTo(item, JSON.stringify([trying, entry.id, state.sortedBy]));
   });
 }
 

@@ -2,19 +2,21 @@
 
 import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
-import { changed, image, isComplete, isFound, state } from "./store.js";
+import { isOld, OLD, partSettings } from "./part_settings.js";
+import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
+import { percent, seconds } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
-  ["C", "Keypoints (recommended)", "The best all-round. Half a minute."],
+  ["C", "Keypoints (recommended)", "The best all-round. One to four minutes."],
   ["S", "Shape", "Ready in seconds; weaker when partly hidden."],
-  ["A", "Crop", "Turn from a crop. A minute."],
+  ["A", "Crop", "Turn from a crop. Longer than C."],
   ["B", "Box", "As C, at the box’s middle."],
-  ["D", "Mask", "Needs the outline. A minute."],
+  ["D", "Mask", "Needs the outline. Longer than C."],
 ];
 
 /** Number of turns in which a part looks the same, each with an example. */
@@ -44,11 +46,8 @@ for (const [letter, name, says] of MODELS) {
   else by("other-models").append(item);
 }
 
-export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
 /** Whether the model in use is taught in seconds: it then learns at once from confirmed detections. */
 export const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
-const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
-const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 
 by("teach-form").addEventListener("submit", (event) => {
   event.preventDefault();
@@ -58,21 +57,17 @@ by("teach-form").addEventListener("submit", (event) => {
 /** The settings in the form. */
 export function teachRequest() {
   preselect();
+  preselected = true;
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
   const minutes = number("budget");
   return {
     model: new FormData(by("teach-form")).get("model"),
     time_budget_secs: minutes === null ? null : minutes * 60,
     steps: number("steps"),
-    symmetry: Number(new FormData(by("teach-form")).get("symmetry")),
-    fixed_height: by("fixed-height").checked && !state.isCalibrated,
+    ...partSettings(),
     seed: number("seed") ?? 1,
   };
 }
-
-/** The settings that describe the part, and their values in the last teaching; null before it. */
-const partSettings = () => JSON.stringify([chosen("symmetry").value, by("fixed-height").checked]);
-let taughtWith = null;
 
 /** Teaches as the form says. */
 export async function teach() {
@@ -81,7 +76,6 @@ export async function teach() {
   by("teach-error").hidden = true;
   try {
     state.teaching = await api.teach(request);
-    taughtWith = partSettings();
     document.querySelector(".panel").scrollTop = 0;
     watch();
   } catch (error) {
@@ -108,16 +102,22 @@ export async function watch() {
   }
   if (state.teaching.status === "done") {
     state.models = (await api.session().catch(() => state)).models;
-    // Results of another model are outdated; the changes are reported.
-    for (const trial of state.trialPictures) trial.before = trial.detections && trial.detections.filter(isFound).length;
-    for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
+    searchAgain({ compares: true });
     changed();
   }
 }
 
-function negativesText() {
-  const count = state.trialPictures.filter((trial) => trial.is_absent).length;
-  return count ? ` and ${count === 1 ? "a picture" : `${count} pictures`} without it` : "";
+/** What a model is or was taught from, in words. */
+function materialText(photos, negatives) {
+  const without = negatives ? ` and ${negatives === 1 ? "a picture" : `${negatives} pictures`} without it` : "";
+  return `From ${photos === 1 ? "the marked photo" : `${photos} marked photos`} of “${state.label}”${without}.`;
+}
+
+/** The progress of the teaching, in words. */
+export function progressText() {
+  const { planned, done, elapsed_secs: gone, left_secs: left } = state.teaching;
+  if (!planned) return isRunning() ? "Getting ready…" : "";
+  return `Step ${done} of ${planned}, ${seconds(gone)} gone${left === null || !isRunning() ? "" : `, about ${seconds(left)} left`}`;
 }
 
 function renderCurve(losses) {
@@ -141,10 +141,7 @@ function renderProgress(news) {
   }[news.status] ?? "";
   by("progress-bar").value = news.planned ? news.done / news.planned : 0;
   by("progress-bar").hidden = !isRunning();
-  const left = news.left_secs === null || !isRunning() ? "" : `, about ${seconds(news.left_secs)} left`;
-  by("progress-text").textContent = news.planned
-    ? `Step ${news.done} of ${news.planned}, ${seconds(news.elapsed_secs)} gone${left}`
-    : isRunning() ? "Getting ready…" : "";
+  by("progress-text").textContent = progressText();
   by("teach-form").hidden = isRunning();
   by("teach-stop").hidden = !isRunning();
   // Before the first result there is nothing to keep.
@@ -172,15 +169,14 @@ function renderOutcome(news) {
   if (outcome.textContent !== text) outcome.textContent = text;
   by("teach-error").hidden = news.status !== "failed";
   by("teach-error").textContent = news.error ?? "";
-  const hasChanged = Boolean(state.models.at(-1)?.is_stale) || (taughtWith !== null && taughtWith !== partSettings());
-  const isOld = news.status === "done" && hasChanged;
-  outcome.classList.toggle("outdated", isOld);
-  by("teach-old").hidden = !isOld;
-  const old = isOld ? "This result is old: photos, marks, pictures without the part or the part's symmetry have changed since. Teach again." : "";
+  const hasChanged = news.status === "done" && isOld(state.models.at(-1));
+  outcome.classList.toggle("outdated", hasChanged);
+  by("teach-old").hidden = !hasChanged;
+  const old = hasChanged ? `This result is old: ${OLD}. Teach again.` : "";
   if (by("teach-old").textContent !== old) by("teach-old").textContent = old;
   by("go-try").hidden = news.status !== "done";
-  by("go-try").classList.toggle("primary", !isOld);
-  by("teach-start").classList.toggle("primary", news.status !== "done" || isOld);
+  by("go-try").classList.toggle("primary", !hasChanged);
+  by("teach-start").classList.toggle("primary", news.status !== "done" || hasChanged);
 }
 
 const chosen = (name) => document.querySelector(`[name=${name}]:checked`);
@@ -205,22 +201,27 @@ function renderFolds() {
 }
 by("teach-form").addEventListener("change", changed);
 
-/** The model that was taught last is selected. */
+/** The model in use and its settings of the part are selected. */
 let preselected = false;
 function preselect() {
   const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);
   if (preselected || !last) return;
   preselected = true;
-  document.querySelector(`[name=model][value=${last.summary.model}]`).checked = true;
+  for (const [name, value] of [["model", last.summary.model], ["symmetry", last.symmetry]]) {
+    const input = document.querySelector(`[name=${name}][value="${value}"]`);
+    if (input) input.checked = true;
+  }
+  by("fixed-height").checked = Boolean(last.fixed_height);
 }
 
 export function renderTeach() {
   preselect();
   const news = state.teaching;
   const marked = state.images.filter(isComplete);
-  by("teach-from").textContent = marked.length
-    ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”${negativesText()}.`
-    : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
+  const negatives = state.trialPictures.filter((trial) => trial.is_absent).length;
+  by("teach-from").textContent = isRunning()
+    ? materialText(news.photos, news.negatives)
+    : marked.length ? materialText(marked.length, negatives) : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);

@@ -4,17 +4,20 @@ import { api } from "./api.js";
 import { button } from "./buttons.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
+import { changeOf, changesText } from "./changes.js";
 import { boundsOf } from "./geometry.js";
 import { renderHelps } from "./helps.js";
-import { placeText, touchText } from "./live.js";
+import { foundTitle, placeText, touchText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
+import { isOld, OLD } from "./part_settings.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
-import { changed, isFound, isLive, state, trialPicture } from "./store.js";
+import { changed, isAccepted, isFound, isLive, isRunning, MODEL_LIMIT, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
-import { isQuick, isRunning, teach } from "./teach.js";
+import { isQuick, progressText, teach } from "./teach.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
+import { byName } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
@@ -22,6 +25,7 @@ const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** Up to this number of pictures the order does not matter. */
 const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
+const currentModel = () => state.models.find((model) => model.is_current);
 
 by("add-pictures").addEventListener("click", () => by("picture-input").click());
 by("add-folder").addEventListener("click", () => by("folder-input").click());
@@ -52,6 +56,13 @@ by("least-score").addEventListener("input", () => {
   state.minScore = by("least-score").valueAsNumber;
   changed();
 });
+by("least-score-back").textContent = `Back to ${MODEL_LIMIT.toFixed(2)}`;
+by("least-score-back").addEventListener("click", () => {
+  state.minScore = by("least-score").valueAsNumber = MODEL_LIMIT;
+  // The button disappears.
+  by("least-score").focus();
+  changed();
+});
 by("sort-pictures").addEventListener("change", () => {
   state.sortedBy = by("sort-pictures").value;
   changed();
@@ -62,7 +73,7 @@ by("show-differences").addEventListener("change", () => {
 });
 
 async function addPictures(files) {
-  const pictures = files.filter((file) => PICTURE.test(file.name));
+  const pictures = files.filter((file) => PICTURE.test(file.name)).sort(byName);
   const problem = by("try-error");
   problem.hidden = true;
   if (!pictures.length) {
@@ -127,34 +138,34 @@ async function accept(marks, { correct }) {
 
 /** The effect of the last teaching on the pictures that were tried before it. */
 function renderLearnt() {
-  const again = state.trialPictures.filter(({ before, detections }) => typeof before === "number" && detections);
-  const known = state.trialPictures.filter(({ before }) => typeof before === "number");
-  let text = "";
-  if (isRunning() && state.tab === "try") text = "It learns from your answers…";
-  else if (known.length && again.length < known.length) text = `The new model looks at the pictures again: ${again.length} of ${known.length}…`;
+  const known = isRunning() ? [] : state.trialPictures.filter(({ before, failed }) => before && !failed);
+  const again = known.filter(({ detections }) => detections);
+  let [text, isGood] = ["", true];
+  if (again.length < known.length) text = `The new model looks at the pictures again: ${again.length} of ${known.length}…`;
   else if (known.length) {
-    const count = (trial) => trial.detections.filter(isFound).length;
-    const names = (list) => new Intl.ListFormat("en").format(list.map(({ name }) => name));
-    const more = again.filter((trial) => count(trial) > trial.before);
-    const less = again.filter((trial) => count(trial) < trial.before);
-    const [was, is] = [again.filter(({ before }) => before), again.filter(count)];
-    text = `The new model finds the part in ${is.length} of ${again.length} pictures; the one before: in ${was.length}.`;
-    if (more.length) text += ` More is found in ${names(more)}.`;
-    if (less.length) text += ` Less is found in ${names(less)}.`;
-    if (!more.length && !less.length) text += " No picture has changed.";
+    const turns = currentModel()?.symmetry ?? 1;
+    const marksOf = (detections) => detections.filter(isFound).map(({ marks }) => marks);
+    const pairs = known.map(({ name, before, detections }) => ({ name, was: marksOf(before), is: marksOf(detections) }));
+    const changes = pairs.map(({ name, was, is }) => ({ name, change: changeOf(was, is, turns) }));
+    const [was, is] = ["was", "is"].map((which) => pairs.filter((pair) => pair[which].length).length);
+    text = `The new model finds the part in ${is} of ${known.length} pictures; the one before: in ${was}. ${changesText(changes)}`;
+    isGood = changes.every(({ change }) => change === null || change === "more");
   }
   by("learnt").hidden = !text;
+  by("learnt").className = isGood ? "learnt" : "warning";
   if (by("learnt").textContent !== text) by("learnt").textContent = text;
 }
 
 by("save-csv").addEventListener("click", () => exportPictures("csv"));
 by("save-json").addEventListener("click", () => exportPictures("json"));
 
-/** Teaches with the same settings and the new pictures, and shows the progress. */
-function teachAgain() {
-  openTab("teach");
-  by("tab-teach").focus();
-  teach();
+/** A button that teaches with the same settings and the new pictures, and shows the progress. */
+function teachButton() {
+  return button(isRunning() ? "Show the teaching" : "Teach again", () => {
+    openTab("teach");
+    by("tab-teach").focus();
+    teach();
+  }, isRunning() ? "" : "primary");
 }
 
 /** States that the part is not in this picture, or revokes that. */
@@ -178,23 +189,26 @@ function card(detection, i, listed, shown) {
   const item = document.createElement("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
-  const title = text("h3", numbered(isFound(detection) ? "Found the part" : "Refused", i, count));
+  const isSure = isAccepted(detection);
+  const isWrong = shown.is_absent && isFound(detection);
+  const title = text("h3", numbered(isWrong ? "Wrongly found" : foundTitle(detection), i, count));
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
-  if (shown.became === null) {
-    const words = isFound(detection) ? "Right: learn from it" : "Right after all: learn from it";
+  const isOpen = shown.became === null && !shown.is_absent;
+  if (isOpen) {
+    const words = isSure ? "Right: learn from it" : "Right after all: learn from it";
     row.append(button(words, () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }
   item.append(title);
-  const refusal = isFound(detection) ? null : detection.refusal;
+  const refusal = isSure ? null : detection.refusal;
   item.append(text("p", placeText(detection), "pose"));
   const touching = touchText(detection, shown.detections, listed);
   if (touching) item.append(text("p", touching, "warning"));
   if (!isFound(detection) && !refusal) item.append(text("p", "Why: its score is below the minimum.", "why"));
   if (refusal) {
     item.append(text("p", `Why: ${refusal.reason}.`, "why"));
-    if (refusal.remedy) item.append(text("p", `What would help: ${refusal.remedy}.`));
+    if (refusal.remedy && isOpen) item.append(text("p", `What would help: ${refusal.remedy}.`));
     if (state.showDifferences && (refusal.edges.length || refusal.surface.length)) {
       const legend = text("p", "On the picture: ", "legend");
       if (refusal.edges.length) legend.append(text("span", "edges differ", "edges"), " ");
@@ -202,6 +216,7 @@ function card(detection, i, listed, shown) {
       item.append(legend);
     }
   }
+  if (isOpen && detection.cut) item.append(text("p", detection.cut, "warning"));
   const { outline, box } = detection.marks;
   row.append(button("Zoom to it", () => showBox(outline ? boundsOf(outline) : box), "plain"));
   item.append(row);
@@ -211,14 +226,14 @@ function card(detection, i, listed, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : trialPicture();
-  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught()]);
+  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()]);
   if (found.dataset.shown === wanted) return;
   found.dataset.shown = wanted;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));
   if (!shown.detections) return found.append(text("p", "Looking…"));
-  const accepted = shown.detections.filter(isFound);
+  const accepted = shown.detections.filter(isAccepted);
   const refused = shown.detections.length - accepted.length;
   const time = `Search took ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
   found.append(text("p", time + (accepted.length ? "" : "Nothing is accepted.")));
@@ -233,7 +248,7 @@ function renderFound() {
     found.append(text("p", `Now a demonstration: ${state.images[index]?.name}.`), button("Look at its marks", () => {
       openTab("mark");
       openImage(index);
-    }), button("Teach again", teachAgain, "primary"));
+    }), teachButton());
   } else if (!shown.is_absent) {
     found.append(button("The part is not here", () => setAbsent(shown, true), accepted.length ? "" : "plain"));
   }
@@ -241,7 +256,7 @@ function renderFound() {
     const nothing = { box: null, grasp: null, outline: null };
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
-  if (shown.is_absent) found.append(button("Teach again", teachAgain, "primary"));
+  if (shown.is_absent) found.append(teachButton());
   found.append(button("Remove this picture", () => removeTrialPicture(shown), "plain"));
   const more = shown.detections.filter((d) => !isFound(d) && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
@@ -265,35 +280,40 @@ function renderJudge() {
   by("judge").hidden = !isTaught() || !(looked.length || state.camera);
   const least = state.minScore.toFixed(2);
   by("least-score-value").textContent = least;
-  // Detections that hardly resemble the part are not counted as candidates.
-  const places = looked.flatMap((trial) => trial.detections).filter((d) => d.score >= MIN_SHOWN);
+  const places = looked.flatMap((trial) => trial.detections);
+  const [above, sure] = [isFound, isAccepted].map((which) => places.filter(which).length);
+  const isLow = state.minScore < MODEL_LIMIT;
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
   // Tracked parts are judged by their track: there the option requires searching each frame on its own.
   const ofLive = state.camera ? `; with --from also --every-frame` : "";
-  const beyond = state.minScore === 0.5 ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
-  const words = looked.length
-    ? `Found ${places.filter(isFound).length} of ${places.length} candidates at ${least}, in ${inPictures} of ${looked.length} pictures${looked.length < state.trialPictures.length ? ` (${state.trialPictures.length - looked.length} are still looked at)` : ""}.${beyond}`
-    : beyond.trim();
-  if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
+  by("least-score-back").hidden = state.minScore === MODEL_LIMIT;
+  const beyond = state.minScore === MODEL_LIMIT ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
   const all = state.trialPictures.length;
+  const counted = `${isLow ? `Above ${least}:` : "Found"} ${above} of ${places.length} candidates${isLow ? "" : ` at ${least}`}, in ${inPictures} of ${looked.length} pictures`;
+  const waiting = looked.length < all ? ` (${all - looked.length} are still looked at)` : "";
+  const low = isLow ? ` ${sure} of them reach${sure === 1 ? "es" : ""} the model’s limit of ${MODEL_LIMIT.toFixed(2)}; those below it are often wrong.` : "";
+  const words = looked.length ? `${counted}${waiting}.${low}${beyond}` : beyond.trim();
+  by("least-score-count").classList.toggle("warning", isLow);
+  if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
   by("looked").hidden = looked.length === all || all < 2;
   Object.assign(by("looked"), { max: Math.max(all, 1), value: looked.length });
   by("export").hidden = !looked.length;
   by("sort-choice").hidden = all < MIN_SORTED;
   const differs = ({ refusal }) => refusal && (refusal.edges.length || refusal.surface.length);
-  by("differences-choice").hidden = isLive() || !trialPicture()?.detections?.some((d) => !isFound(d) && differs(d));
+  by("differences-choice").hidden = isLive() || !trialPicture()?.detections?.some((d) => !isAccepted(d) && differs(d));
+}
+
+function introText() {
+  if (isRunning()) return `A model is being taught (${progressText()}). ${isTaught() ? "Until then, the one before is used." : "Pictures can be added already."}`;
+  if (!isTaught()) return "Nothing is taught yet. Teach a model first; pictures can be added already.";
+  if (!state.trialPictures.length) return "Add pictures that were taken as the first one was, with the part lying in other ways.";
+  return isOld(currentModel()) ? `This model is old: ${OLD}. Teach again to use them.` : "";
 }
 
 export function renderTry() {
   if (state.teaching.status === "done") state.hasModel = true;
   if (state.tab !== "try") return;
-  by("try-intro").textContent = !isTaught()
-    ? "Nothing is taught yet. Teach a model first; pictures can be added already."
-    : state.trialPictures.length
-      ? state.models.find((model) => model.is_current)?.is_stale
-        ? "This model is old: photos, marks or pictures without the part have changed since. Teach again to use them."
-        : ""
-      : "Add pictures that were taken as the first one was, with the part lying in other ways.";
+  by("try-intro").textContent = introText();
   by("try-intro").hidden = !by("try-intro").textContent;
   renderJudge();
   renderLearnt();

@@ -2,12 +2,18 @@
 
 import { api } from "./api.js";
 import { button } from "./buttons.js";
-import { changed, state } from "./store.js";
+import { changeOf, changesText } from "./changes.js";
+import { isOld, OLD } from "./part_settings.js";
+import { changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
+import { percent } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const list = by("version-list");
-const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
+/** A model that finds fewer by this share of the samples is worse. */
+const MIN_DROP = 0.1;
+const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
+const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
 /** Selected for comparison. */
 let chosen = [];
 
@@ -37,11 +43,34 @@ export function gradeOf({ figures }) {
   return found < 0.9 || alarms > 0.05 ? "doubtful" : "good";
 }
 
+/** Whether a model's results are clearly worse than another's. */
+function isWorse({ figures: now }, { figures: before }) {
+  if (!now || !before) return false;
+  const share = ({ found: [count, of] }) => count / Math.max(of, 1);
+  const isNew = (count) => count(now) > 0 && count(before) === 0;
+  return share(before) - share(now) > MIN_DROP - 1e-9 || isNew(({ wrong }) => wrong) || isNew(({ false_alarms: [count] }) => count);
+}
+
+/** A warning, in both steps that show a new model, if it is worse than the one before it. */
+function renderWorse() {
+  const [before, now] = state.models.slice(-2);
+  const isShown = Boolean(now) && now.is_current && !isRunning() && isWorse(now.summary, before.summary);
+  const text = isShown ? `${number(now.id)} is worse on new samples than ${number(before.id)}: ${briefFigures(now.summary)}, before: ${briefFigures(before.summary)}. ` : "";
+  for (const place of document.querySelectorAll(".worse")) {
+    place.hidden = !isShown;
+    if (place.dataset.shown === text) continue;
+    place.dataset.shown = text;
+    place.replaceChildren(text, ...(isShown ? [button(`Use ${number(before.id)} again`, () => use(before.id))] : []));
+  }
+}
+
+const number = (id) => `Model ${id + 1}`;
+
 async function use(id) {
   try {
     const session = await api.useModel(id);
     Object.assign(state, { models: session.models, region: session.region, hasModel: true });
-    for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
+    searchAgain({ compares: false });
     toast("This version is now in use, under the model’s name.");
   } catch (error) {
     toast(error.message);
@@ -55,7 +84,12 @@ async function compare() {
   out.textContent = "Looking at all pictures with both…";
   try {
     const rows = await api.compareModels(one, other);
-    out.replaceChildren(rows.length ? table(rows) : "There is no picture to try yet: add some in the last step.");
+    if (!rows.length) out.textContent = "There is no picture to try yet: add some in the last step.";
+    else {
+      const turns = state.models[Math.max(one, other)].symmetry ?? 1;
+      for (const row of rows) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
+      out.replaceChildren(Object.assign(document.createElement("p"), { textContent: changesText(rows) }), table(rows));
+    }
   } catch (error) {
     out.textContent = error.message;
   }
@@ -67,31 +101,39 @@ function table(rows) {
     const row = made.insertRow();
     for (const cell of cells) row.append(Object.assign(document.createElement(tag), { textContent: cell }));
   };
-  const number = (id) => `Model ${id + 1}`;
   line(["Picture", ...chosen.map(number)], "th");
-  const words = ([count, best], there) => {
-    const right = there === null ? "" : (count > 0) === there ? " ✓" : " ✗";
-    return `${count ? `${count} found` : "nothing"}, ${best.toFixed(2)}${right}`;
+  const words = ({ accepted: { length }, best }, there) => {
+    const right = there === null ? "" : length > 0 === there ? " ✓" : " ✗";
+    return `${length ? `${length} found` : "nothing"}, ${best.toFixed(2)}${right}`;
   };
-  for (const row of rows) line([row.name, ...row.found.map((found) => words(found, row.is_there))], "td");
+  for (const { name, found, change, is_there: isThere } of rows) {
+    // It is not known which of two different grasps is right.
+    const differs = DIFFERS[change] ?? "";
+    const [one, other] = found.map((each) => words(each, differs ? null : isThere));
+    line([name, one, other + differs], "td");
+  }
   return made;
 }
 
 export function renderVersions() {
   const { models } = state;
+  renderWorse();
   // For the only version, just taught, the result above is enough.
   by("versions").hidden = !models.length || (models.length === 1 && state.teaching.status === "done");
-  const wanted = JSON.stringify([models, chosen]);
+  const wanted = JSON.stringify([models, chosen, models.map(isOld)]);
   if (list.dataset.shown === wanted) return;
   list.dataset.shown = wanted;
   list.replaceChildren(...models.map((model) => {
     const item = document.createElement("li");
-    item.className = gradeOf(model.summary);
+    const grade = gradeOf(model.summary);
+    item.className = grade;
     const when = new Date(model.taught_secs * 1000).toLocaleString();
     const title = Object.assign(document.createElement("b"), { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
     const notes = [];
     if (model.is_current) notes.push(Object.assign(document.createElement("span"), { className: "used", textContent: "in use" }));
-    if (model.is_stale) notes.push(Object.assign(document.createElement("span"), { className: "stale", textContent: "stale: photos, marks or pictures without the part have changed since" }));
+    const warning = (textContent) => notes.push(Object.assign(document.createElement("span"), { className: "stale", textContent }));
+    if (GRADES[grade]) warning(GRADES[grade]);
+    if (isOld(model)) warning(`stale: ${OLD}`);
     const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
     const figures = Object.assign(document.createElement("small"), { textContent: of + briefFigures(model.summary) });
     const row = Object.assign(document.createElement("div"), { className: "row" });

@@ -168,15 +168,22 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
     }
 }
 
+/// A warning if the part touches the border of the picture.
+pub fn part_cut(marks: &Marks, size: [u32; 2]) -> Option<String> {
+    let [width, height] = size.map(f64::from);
+    let around = Polygon::bounds(&marks.region()?);
+    let is_inside = around.x1 >= BORDER_PX
+        && around.y1 >= BORDER_PX
+        && around.x2 <= width - BORDER_PX
+        && around.y2 <= height - BORDER_PX;
+    let text = "The part touches the border of the photo and may be cut. A photo of the whole part teaches better.";
+    (!is_inside).then(|| text.to_owned())
+}
+
 fn about_place(marks: &Marks, size: [u32; 2], remarks: &mut Vec<Remark>) {
     let Some(part) = marks.region() else { return };
-    let [width, height] = size.map(f64::from);
     let around = Polygon::bounds(&part);
-    if around.x1 < BORDER_PX || around.y1 < BORDER_PX || around.x2 > width - BORDER_PX || around.y2 > height - BORDER_PX
-    {
-        let text = "The part touches the border of the photo and may be cut. A photo of the whole part teaches better.";
-        remarks.push(remark("part_cut", text, None));
-    }
+    remarks.extend(part_cut(marks, size).map(|text| remark("part_cut", text, None)));
     if around.width().max(around.height()) < MIN_PART_PX {
         let text = "The part is very small in the photo. Go closer, so that there is more of it to learn.";
         remarks.push(remark("part_small", text, None));

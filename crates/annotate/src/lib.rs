@@ -74,4 +74,4 @@ pub use teacher::{
 };
 pub use teaching::{News, Status};
 pub use token_file::token_of_file;
-pub use views::{ComparedPicture, ImageView, ModelView, OtherView, Saved, SessionView, TrialPictureView};
+pub use views::{ComparedPicture, ImageView, ModelView, OtherView, Saved, SessionView, TrialPictureView, VersionFound};

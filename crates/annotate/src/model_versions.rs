@@ -35,6 +35,11 @@ pub struct Version {
     pub negatives: usize,
     /// [`fingerprint`] of the teaching's inputs.
     pub material: String,
+    /// The settings of its [`TeachRequest`](crate::teacher::TeachRequest); `None` in files of earlier programs.
+    #[serde(default)]
+    pub symmetry: Option<u32>,
+    #[serde(default)]
+    pub fixed_height: Option<bool>,
 }
 
 /// All versions, oldest first.
@@ -151,7 +156,8 @@ mod tests {
     fn version(taught_secs: u64) -> Version {
         let summary =
             TaughtSummary { model: ModelKind::S, object: "rod".into(), seconds: 1.0, figures: None, negatives: None };
-        Version { file: String::new(), taught_secs, summary, photos: 1, negatives: 0, material: fingerprint("marks") }
+        let (file, material) = (String::new(), fingerprint("marks"));
+        Version { file, taught_secs, summary, photos: 1, negatives: 0, material, symmetry: None, fixed_height: None }
     }
 
     #[test]

@@ -16,6 +16,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("icon.svg", ICON, include_str!("../page/icon.svg")),
     ("api.js", SCRIPT, include_str!("../page/api.js")),
     ("buttons.js", SCRIPT, include_str!("../page/buttons.js")),
+    ("changes.js", SCRIPT, include_str!("../page/changes.js")),
     ("editing.js", SCRIPT, include_str!("../page/editing.js")),
     ("export.js", SCRIPT, include_str!("../page/export.js")),
     ("folder.js", SCRIPT, include_str!("../page/folder.js")),
@@ -27,6 +28,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
     ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),
+    ("part_settings.js", SCRIPT, include_str!("../page/part_settings.js")),
     ("region.js", SCRIPT, include_str!("../page/region.js")),
     ("server_end.js", SCRIPT, include_str!("../page/server_end.js")),
     ("samples.js", SCRIPT, include_str!("../page/samples.js")),
@@ -40,6 +42,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("try.js", SCRIPT, include_str!("../page/try.js")),
     ("versions.js", SCRIPT, include_str!("../page/versions.js")),
     ("view.js", SCRIPT, include_str!("../page/view.js")),
+    ("words.js", SCRIPT, include_str!("../page/words.js")),
 ];
 
 /// The page's HTML document, as sent.

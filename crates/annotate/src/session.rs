@@ -345,6 +345,7 @@ impl Session {
         let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
         let [photos, num_negatives] = [demonstrations.len(), negatives.len()];
         let material = TeachingMaterial { demonstrations, negatives };
+        let (symmetry, fixed_height) = (Some(request.symmetry), Some(request.fixed_height));
         let state = Arc::clone(&self.state);
         let keep = move |model: &dyn TaughtModel| {
             let bytes = model.to_bytes().map_err(Error::Teacher)?;
@@ -355,6 +356,8 @@ impl Session {
                 photos,
                 negatives: num_negatives,
                 material: fingerprint,
+                symmetry,
+                fixed_height,
             };
             let mut state = locked(&state);
             state.models.keep(&model_path, &bytes, version)?;

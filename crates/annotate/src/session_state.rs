@@ -163,6 +163,8 @@ impl State {
             negatives: version.negatives,
             is_current: self.models.current == Some(id) && !self.is_model_lost,
             is_stale: version.material != material,
+            symmetry: version.symmetry,
+            fixed_height: version.fixed_height,
         };
         self.models.versions.iter().enumerate().map(view).collect()
     }

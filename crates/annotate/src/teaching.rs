@@ -42,6 +42,10 @@ pub struct News {
     pub model: Option<ModelKind>,
     /// The network being trained.
     pub of: &'static str,
+    /// Number of photos of the part that it learns from.
+    pub photos: usize,
+    /// Number of pictures without the part that it learns from.
+    pub negatives: usize,
     /// Steps done.
     pub done: usize,
     /// Steps planned.
@@ -160,7 +164,9 @@ impl Teaching {
     ) -> Result<News> {
         let mut news = locked(&self.news);
         idle(&news)?;
-        *news = News { status: Status::Running, model: Some(request.model), ..News::default() };
+        let (photos, negatives) = (material.demonstrations.len(), material.negatives.len());
+        let model = Some(request.model);
+        *news = News { status: Status::Running, model, photos, negatives, ..News::default() };
         self.stop.store(false, Ordering::SeqCst);
         let begun = news.clone();
         drop(news);

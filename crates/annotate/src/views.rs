@@ -84,6 +84,10 @@ pub struct ModelView {
     pub is_current: bool,
     /// Whether marks, photos or negatives have changed since its teaching.
     pub is_stale: bool,
+    /// Number of equivalent turns in a full rotation, 0 for any turn; `None` if an earlier program taught it.
+    pub symmetry: Option<u32>,
+    /// Whether it was taught for a camera at a constant distance; `None` if an earlier program taught it.
+    pub fixed_height: Option<bool>,
 }
 
 /// A picture of the project's folder that is not in the project.
@@ -93,6 +97,17 @@ pub struct OtherView {
     pub id: usize,
     /// Its file's name.
     pub name: String,
+    /// Whether a picture to try has the same name and content: a demonstration made from it was removed.
+    pub is_tried: bool,
+}
+
+/// The detections of one version in a picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VersionFound {
+    /// The best score of all detections.
+    pub best: f64,
+    /// The marks of the accepted ones without their outlines, the best first.
+    pub accepted: Vec<Marks>,
 }
 
 /// The detections of two versions in one picture to try.
@@ -104,8 +119,8 @@ pub struct ComparedPicture {
     pub name: String,
     /// Whether the part is there, if the user stated it.
     pub is_there: Option<bool>,
-    /// For each version, the number of accepted detections and the best score of all.
-    pub found: [(usize, f64); 2],
+    /// The detections of each version.
+    pub found: [VersionFound; 2],
 }
 
 /// The data with which the page starts.

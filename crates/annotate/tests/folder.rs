@@ -110,6 +110,22 @@ fn a_tried_picture_of_another_folder_is_learnt_from_without_writing_there() {
 }
 
 #[test]
+fn the_copy_of_a_tried_picture_is_not_offered_for_trying() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("POST", "/api/trial-pictures?name=007.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    served.ask("DELETE", "/api/images/1", b"").json();
+    std::fs::write(served.folder.path().join("008.png"), photo_png()).unwrap();
+    let offered = |served: &Served| {
+        let others = session(served)["others"].clone();
+        others.as_array().unwrap().iter().map(|o| (o["name"].clone(), o["is_tried"].clone())).collect::<Vec<_>>()
+    };
+    let expected = [(json!("007.png"), json!(true)), (json!("008.png"), json!(false))];
+    assert_eq!(offered(&served), expected);
+    assert_eq!(offered(&Served::of_photo(served.end(), "rod.png")), expected, "after opening again");
+}
+
+#[test]
 fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
     let served = Served::of_project(folder_of(&["a.png"]));
     assert_eq!(names(&session(&served)["images"]), ["a.png"], "where there is one picture, there is no choice");

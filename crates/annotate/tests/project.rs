@@ -89,7 +89,35 @@ fn models_are_versions_and_marks_that_changed_make_them_stale() {
     try_photo(&served, "table.png");
     let compared = served.ask("POST", "/api/models/0/compare/1", b"").json();
     assert_eq!((&compared[0]["name"], &compared[0]["is_there"]), (&json!("table.png"), &Value::Null));
-    assert_eq!(compared[0]["found"], json!([[0, 0.0], [0, 0.0]]));
+    let nothing = json!({"best": 0.0, "accepted": []});
+    assert_eq!(compared[0]["found"], json!([nothing, nothing]));
+}
+
+#[test]
+fn a_version_keeps_the_settings_of_the_part() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let request = json!({"model": "S", "symmetry": 2, "fixed_height": true, "steps": 100_000}).to_string();
+    let begun = served.ask("POST", "/api/teaching", request.as_bytes()).json();
+    // What is marked in the meantime is not in this teaching.
+    assert_eq!((&begun["photos"], &begun["negatives"]), (&json!(1), &json!(0)));
+    served.ask("DELETE", "/api/teaching", b"").json();
+    while served.ask("GET", "/api/teaching", b"").json()["status"] != "failed" {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let request = request.replace("100000", "3");
+    served.ask("POST", "/api/teaching", request.as_bytes()).json();
+    while served.ask("GET", "/api/teaching", b"").json()["status"] != "done" {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let settings = |served: &Served| {
+        let models = get(served)["models"].clone();
+        [0usize, 1].map(|i| (models[i]["symmetry"].clone(), models[i]["fixed_height"].clone()))
+    };
+    let expected = [(json!(1), json!(false)), (json!(2), json!(true))];
+    assert_eq!(settings(&served), expected);
+    assert_eq!(settings(&Served::of_project(served.end())), expected, "after opening again");
 }
 
 #[test]

@@ -112,6 +112,7 @@ fn a_taught_model_is_tried_and_what_it_found_becomes_a_demonstration() {
     let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
     let detection = &found["detections"][0];
     assert_eq!((&detection["is_accepted"], &detection["marks"]["grasp"]), (&json!(true), &marks()["grasp"]));
+    assert_eq!(detection["cut"], Value::Null);
     let body = detection["marks"].to_string();
     let view = served.ask("POST", "/api/trial-pictures/0/accept", body.as_bytes()).json();
     assert_eq!(
@@ -169,4 +170,17 @@ fn a_region_holds_for_what_is_detected_and_what_is_taught() {
     wait_for(&served, &["failed"]);
     let forged = json!({"model": "S", "region": region(0, 120)}).to_string();
     assert_eq!(served.ask("POST", "/api/teaching", forged.as_bytes()).status, 422, "the session says the region");
+}
+
+#[test]
+fn a_detection_at_the_border_is_told_before_it_is_learnt_from() {
+    let served = Served::start();
+    let at_border = json!({"box": [0.0, 40.0, 140.0, 60.0], "grasp": marks()["grasp"]});
+    put_marks(&served, &at_border);
+    served.ask("POST", "/api/trial-pictures?name=table.png", &served::photo_png()).json();
+    served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
+    assert_eq!(wait_for(&served, &["done", "failed"])["status"], "done");
+    let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
+    let cut = found["detections"][0]["cut"].as_str().unwrap();
+    assert!(cut.starts_with("The part touches the border"), "{cut}");
 }

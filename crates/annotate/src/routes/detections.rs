@@ -5,6 +5,7 @@ use std::time::Instant;
 use image::RgbImage;
 use serde::Serialize;
 
+use crate::advice::part_cut;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::session::Session;
@@ -19,6 +20,8 @@ struct DetectionView {
     pose: Option<GraspPose>,
     refusal: Option<Refusal>,
     touches: Vec<usize>,
+    /// A warning if the part touches the border of the picture: it would be a poor demonstration.
+    cut: Option<String>,
 }
 
 /// All detections of a picture, and the search's duration.
@@ -48,13 +51,11 @@ pub fn detect(session: &Session, picture: &RgbImage, explained: Explained) -> Re
     };
     let found = found.map_err(Error::Teacher)?;
     let seconds = start.elapsed().as_secs_f64();
-    let view = |found: FoundGrasp| DetectionView {
-        score: found.score,
-        is_accepted: found.is_accepted,
-        marks: Marks::of_found(&found, size),
-        pose: found.pose,
-        refusal: found.refusal,
-        touches: found.touches,
+    let view = |found: FoundGrasp| {
+        let marks = Marks::of_found(&found, size);
+        let cut = part_cut(&marks, size);
+        let FoundGrasp { score, is_accepted, pose, refusal, touches, .. } = found;
+        DetectionView { score, is_accepted, marks, pose, refusal, touches, cut }
     };
     Ok(DetectionsView { seconds, detections: found.into_iter().map(view).collect() })
 }

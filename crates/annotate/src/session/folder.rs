@@ -24,7 +24,11 @@ impl State {
                 self.offered.push(path);
             }
         }
-        let view = |(id, path): (usize, &PathBuf)| OtherView { id, name: file_name(path) };
+        let view = |(id, path): (usize, &PathBuf)| {
+            let name = file_name(path);
+            let is_tried = self.is_tried_copy(path, &name);
+            OtherView { id, name, is_tried }
+        };
         self.offered.iter().enumerate().filter(|(_, path)| self.is_other(path)).map(view).collect()
     }
 
@@ -34,10 +38,26 @@ impl State {
         !is_photo && !is_tried && path.is_file()
     }
 
+    /// Whether this file is a copy of a picture to try. One from elsewhere is copied into the folder when it becomes a
+    /// demonstration; the copy stays when that is removed. In later sessions only its name and content tell.
+    fn is_tried_copy(&self, path: &Path, name: &str) -> bool {
+        self.trial_ids().map(|id| &self.trial_pictures[id]).any(|trial| {
+            let is_copied = trial.became.is_some_and(|id| self.images[id].picture.path == path);
+            is_copied || (trial.picture.name == name && is_same_file(&trial.picture.path, path))
+        })
+    }
+
     fn other(&self, id: usize) -> Result<&Path> {
         let there = self.offered.get(id).filter(|path| self.is_other(path));
         there.map(PathBuf::as_path).ok_or(Error::NoSuchPicture { id, count: self.offered.len() })
     }
+}
+
+/// Whether two files can be read and have the same content.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    let size = |path: &Path| std::fs::metadata(path).map(|metadata| metadata.len());
+    let is_same_size = size(one).is_ok_and(|found| size(other).is_ok_and(|expected| found == expected));
+    is_same_size && std::fs::read(one).is_ok_and(|one| std::fs::read(other).is_ok_and(|other| one == other))
 }
 
 impl Session {

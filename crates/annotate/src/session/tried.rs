@@ -12,7 +12,7 @@ use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
 use crate::session_state::{MarkedPicture, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
-use crate::views::{ComparedPicture, ImageView, TrialPictureView};
+use crate::views::{ComparedPicture, ImageView, TrialPictureView, VersionFound};
 
 /// A query whether learning from a picture would help in others.
 #[derive(Deserialize)]
@@ -132,15 +132,14 @@ impl Session {
             let found = |model: &dyn TaughtModel| {
                 let found = model.detect(&pixels).map_err(Error::Teacher)?;
                 let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
-                Ok::<_, Error>((found.iter().filter(|one| one.is_accepted).count(), best))
+                let accepted = found.iter().filter(|one| one.is_accepted);
+                let marks = |one| Marks { outline: None, ..Marks::of_found(one, trial.picture.size) };
+                let accepted = accepted.map(marks).collect();
+                Ok::<_, Error>(VersionFound { best, accepted })
             };
             let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
-            Ok(ComparedPicture {
-                id,
-                name: trial.picture.name,
-                is_there,
-                found: [found(&*models[0])?, found(&*models[1])?],
-            })
+            let found = [found(&*models[0])?, found(&*models[1])?];
+            Ok(ComparedPicture { id, name: trial.picture.name, is_there, found })
         });
         compared.collect()
     }

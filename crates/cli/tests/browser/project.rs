@@ -188,7 +188,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
     assert!(learnt.contains("of 1 pictures; the one before: in 0."), "{learnt}");
     let is_found = page.text("#found").contains("Found the part");
     assert!(
-        learnt.contains(if is_found { "More is found in covered.png" } else { "No picture has changed" }),
+        learnt.contains(if is_found { "In 1 picture more is found: covered.png." } else { "No picture has changed" }),
         "{learnt}"
     );
     page.screenshot("project-16-learnt");
@@ -285,7 +285,7 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     page.click("#version-list li:nth-child(1) button");
     page.wait_for("the first in use", "return document.querySelector('#version-list li').innerText.includes('in use')");
     page.click("#tab-try");
-    page.wait_for("what was said", "return document.getElementById('strip').innerText.includes('part not here')");
+    page.wait_for("what was said", "return document.getElementById('strip').innerText.includes('✓ not here')");
     page.assert_quiet();
 }
 

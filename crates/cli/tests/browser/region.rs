@@ -109,6 +109,12 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     // The next model stores the region; after a reload it is shown again.
     teach(&page);
     assert_eq!(region_of_file(&page), Some(ON_IT.map(|side| side as u32)));
+    // Its effect is told, but not that of another region as if it were that of a model.
+    page.click("#tab-try");
+    let learnt = "return document.getElementById('learnt').innerText.startsWith('The new model finds')";
+    patiently(&page, "what was learnt", learnt);
+    page.click("#region-set");
+    page.wait_for("nothing learnt", "return document.getElementById('learnt').hidden");
     page.browser.run("window.isOld = true; location.reload()", &[]).unwrap();
     page.wait_for("the page again", "return !window.isOld && document.querySelectorAll('.todo li.done').length === 3");
     page.click("#tab-try");

@@ -1,5 +1,5 @@
-//! Tried pictures: jaws that touch a neighbour, the refused picture that helps most, and two hundred pictures in one
-//! action.
+//! Tried pictures: jaws that touch a neighbour, the refused picture that helps most, two hundred pictures in one
+//! action, a low minimum score, a part at the border, and the row of pictures.
 
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use super::photo_to_grasp::patiently;
 use crate::support::pendulum_twice;
 
 /// A page whose model S was taught from the pendulum's photo.
-fn taught() -> Page {
+pub fn taught() -> Page {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
     let marks = repository().join("datasets/demonstrations/pendulum/annotation.json");
@@ -25,7 +25,7 @@ fn taught() -> Page {
 }
 
 /// Adds several pictures in one action.
-fn add(page: &Page, pictures: &[(String, RgbImage)]) {
+pub fn add(page: &Page, pictures: &[(String, RgbImage)]) {
     let paths: Vec<_> = pictures.iter().map(|(name, _)| page.folder.path().join(name)).collect();
     for (path, (_, picture)) in paths.iter().zip(pictures) {
         picture.save(path).unwrap();
@@ -42,7 +42,7 @@ fn looked_at(count: usize) -> String {
     )
 }
 
-fn photo() -> RgbImage {
+pub fn photo() -> RgbImage {
     image::open(shipped_photo()).unwrap().into_rgb8()
 }
 
@@ -105,16 +105,22 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     page.assert_quiet();
 }
 
-#[test]
-#[ignore = "make test-browser: needs Chromium"]
-fn the_page_says_which_refused_picture_helps_most() {
-    let page = taught();
+/// The part, its right half covered.
+fn covered() -> RgbImage {
     let mut covered = photo();
     for y in 150..300 {
         for x in 344..400 {
             covered.put_pixel(x, y, Rgb([120, 130, 70]));
         }
     }
+    covered
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_page_says_which_refused_picture_helps_most() {
+    let page = taught();
+    let covered = covered();
     let places = [[150, 90], [190, 120], [170, 60]];
     let pictures: Vec<_> =
         places.iter().enumerate().map(|(i, &place)| (format!("covered-{i}.png"), crop(&covered, place))).collect();
@@ -206,5 +212,106 @@ fn pictures_of_the_folder_are_shown_once_they_are_taken_in() {
     page.wait_for("the first of them", is_shown);
     assert_eq!(page.browser.run("return document.querySelectorAll('#strip button').length", &[]).unwrap(), json!(2));
     assert!(page.browser.run("return document.getElementById('empty').hidden", &[]).unwrap().as_bool().unwrap());
+    page.assert_quiet();
+}
+
+/// The texts of all elements that a selector names.
+fn texts(page: &Page, css: &str) -> Vec<String> {
+    let script = "return [...document.querySelectorAll(arguments[0])].map((e) => e.innerText)";
+    let texts = page.browser.run(script, &[json!(css)]).unwrap();
+    texts.as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn below_the_model_s_limit_the_page_warns_and_all_counts_agree() {
+    let page = taught();
+    let pictures = [("covered.png", crop(&covered(), [150, 90])), ("whole.png", crop(&photo(), [150, 90]))];
+    add(&page, &pictures.map(|(name, picture)| (name.to_owned(), picture)));
+    patiently(&page, "both pictures", &looked_at(2));
+    assert!(page.text("#least-score-count").starts_with("Found 1 of "), "{}", page.text("#least-score-count"));
+    let slide = "const s = document.getElementById('least-score'); s.value = 0; s.dispatchEvent(new Event('input'))";
+    page.browser.run(slide, &[]).unwrap();
+    page.wait_for("the warning", "return document.getElementById('least-score-count').className === 'warning'");
+    page.settle_frames();
+    let count = page.text("#least-score-count");
+    assert!(count.contains("1 of them reaches the model’s limit of 0.50"), "{count}");
+    let rows = texts(&page, "#strip button span:last-child");
+    assert!(rows.iter().all(|row| row.ends_with("above 0.00") || row == "1 found"), "{rows:?}");
+    let sum: usize = rows.iter().map(|row| row.split(' ').next().unwrap().parse::<usize>().unwrap()).sum();
+    assert!(count.starts_with(&format!("Above 0.00: {sum} of {sum} candidates, in 2 of 2 pictures")), "{count}");
+    let titles = texts(&page, "#found .found h3");
+    assert!(
+        titles.iter().any(|title| title.contains("Above the slider, below the model’s limit of 0.50")),
+        "{titles:?}"
+    );
+    let drawn = "return document.querySelectorAll('#overlay .refused').length";
+    assert!(page.browser.run(drawn, &[]).unwrap().as_u64().unwrap() > 0, "they are drawn as refused");
+    page.screenshot("tried-4-low-score");
+    page.assert_accessible("a low minimum score");
+    page.click("#least-score-back");
+    page.wait_for("the limit", "return document.getElementById('least-score').value === '0.5'");
+    page.settle_frames();
+    assert!(page.text("#least-score-count").starts_with("Found 1 of "), "{}", page.text("#least-score-count"));
+    // Without the part, nothing is to be learnt from it.
+    let not_here =
+        "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'The part is not here').click()";
+    page.browser.run(not_here, &[]).unwrap();
+    page.wait_for("its word", "return document.getElementById('found').innerText.includes('You said that')");
+    let found = page.text("#found");
+    assert!(!found.contains("learn from it") && !found.contains("What would help"), "{found}");
+    let is_cut =
+        "const span = document.querySelector('#strip span:last-child'); return span.scrollWidth > span.clientWidth";
+    assert_eq!(page.browser.run(is_cut, &[]).unwrap(), json!(false), "{:?}", texts(&page, "#strip button"));
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_part_at_the_border_is_told_and_the_result_is_below_the_picture_on_a_phone() {
+    let page = taught();
+    add(&page, &[("border.png".to_owned(), crop(&photo(), [262, 100]))]);
+    patiently(&page, "a detection", "return document.querySelector('#found .found') !== null");
+    let warnings = texts(&page, "#found .warning");
+    assert!(warnings.iter().any(|text| text.starts_with("The part touches the border")), "{warnings:?}");
+    page.browser.emulate(390, 844, false).unwrap();
+    page.settle_frames();
+    let below = "const rect = (css) => document.querySelector(css).getBoundingClientRect();
+        return rect('#found').top - rect('#strip').bottom";
+    let below = page.browser.run(below, &[]).unwrap().as_f64().unwrap();
+    assert!((0.0..40.0).contains(&below), "{below} px");
+    page.screenshot("tried-5-phone");
+    page.assert_accessible("the result on a phone");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_row_is_sorted_by_name_and_follows_the_shown_picture() {
+    let page = Page::open();
+    page.click("#tab-try");
+    let pictures: Vec<_> = (1..=12).rev().map(|number| (format!("p{number}.png"), photo())).collect();
+    add(&page, &pictures);
+    let shown = |name: &str| format!("return document.getElementById('photo').alt === 'Photo {name}'");
+    page.wait_for("the first", &shown("p1.png"));
+    page.settle_frames();
+    let sorted: Vec<_> = (1..=12).map(|number| format!("p{number}.png")).collect();
+    assert_eq!(texts(&page, "#strip button span:nth-child(2)"), sorted);
+    page.click("#zoom-in");
+    page.settle_frames();
+    let width = "return document.getElementById('photo').getBoundingClientRect().width";
+    let zoomed = page.browser.run(width, &[]).unwrap();
+    let in_sight = "const rect = (css) => document.querySelector(css).getBoundingClientRect();
+        const [at, row] = [rect('#strip [aria-current=true]'), rect('#strip')];
+        return at.left >= row.left - 1 && at.right <= row.right + 1";
+    for (key, numbers) in [("n", (2..=12).collect::<Vec<_>>()), ("m", (1..=11).rev().collect())] {
+        for number in numbers {
+            page.browser.press(&[key]).unwrap();
+            page.wait_for("the picture", &shown(&format!("p{number}.png")));
+            page.settle_frames();
+            assert_eq!(page.browser.run(in_sight, &[]).unwrap(), json!(true), "p{number}.png");
+            assert_eq!(page.browser.run(width, &[]).unwrap(), zoomed, "p{number}.png");
+        }
+    }
     page.assert_quiet();
 }

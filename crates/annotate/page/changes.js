@@ -1,0 +1,43 @@
+// Differences between the grasps that two models accept in the same picture.
+
+import { gripperOf, norm, sub, times } from "./geometry.js";
+import { listText } from "./words.js";
+
+/** A hand turned by more than this is another grasp. */
+const MAX_TURN = (20 * Math.PI) / 180;
+/** So is a hand moved by more than this share of the part's length. */
+const MAX_MOVE = 0.1;
+const MAX_NAMES = 30;
+const WORDS = { less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere", more: "more is found" };
+
+/**
+ * The change from the marks of some detections to those of others: "more" or "less" are found, or a hand is "turned"
+ * or "moved"; null if there is none. `turns`: number of turns in which the part looks the same, 0 for any.
+ */
+export function changeOf(before, after, turns) {
+  if (after.length !== before.length) return after.length > before.length ? "more" : "less";
+  // A part that looks the same when turned may be held at the opposite place: then its own middle is compared.
+  const place = ({ box: [x1, y1, x2, y2], grasp }) => (turns === 1 ? gripperOf(grasp).center : times([x1 + x2, y1 + y2], 0.5));
+  const left = [...after];
+  let change = null;
+  for (const marks of before) {
+    const distance = (other) => norm(sub(place(other), place(marks)));
+    const nearest = left.reduce((a, b) => (distance(b) < distance(a) ? b : a));
+    left.splice(left.indexOf(nearest), 1);
+    const angle = gripperOf(nearest.grasp).angle - gripperOf(marks.grasp).angle;
+    const same = (2 * Math.PI) / turns;
+    const [x1, y1, x2, y2] = marks.box;
+    if (turns && Math.abs(angle - same * Math.round(angle / same)) > MAX_TURN) return "turned";
+    if (distance(nearest) > MAX_MOVE * Math.max(x2 - x1, y2 - y1)) change = "moved";
+  }
+  return change;
+}
+
+/** The changes of several pictures, `{ name, change }`, in words. */
+export function changesText(pictures) {
+  const sentences = Object.entries(WORDS).map(([kind, words]) => {
+    const names = pictures.filter(({ change }) => change === kind).map(({ name }) => name);
+    return names.length ? `In ${names.length} picture${names.length === 1 ? "" : "s"} ${words}: ${listText(names, MAX_NAMES)}.` : "";
+  });
+  return sentences.filter(Boolean).join(" ") || "No picture has changed.";
+}

@@ -1,0 +1,121 @@
+//! Versions of the model: a turned hand is a change, a worse version is warned of, and the page says that a model is
+//! being taught.
+
+use serde_json::json;
+
+use super::page::{Page, repository, shipped_photo};
+use super::photo_to_grasp::patiently;
+use super::tried::{add, photo, taught};
+
+const LEARNT: &str =
+    "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_hand_turned_by_half_a_turn_is_a_change() {
+    let page = taught();
+    add(&page, &[("other.png".to_owned(), photo())]);
+    patiently(&page, "a grasp", "return document.getElementById('found').innerText.includes('Found the part')");
+    page.click("#tab-mark");
+    page.click("#turn-around");
+    page.settle();
+    page.click("#tab-teach");
+    page.wait_for("the old result", "return !document.getElementById('teach-old').hidden");
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
+    page.click("#tab-try");
+    let learnt = patiently(&page, "the change", LEARNT);
+    assert!(learnt.as_str().unwrap().ends_with("In 1 picture the hand is turned: other.png."), "{learnt}");
+    let is_warning = "return document.getElementById('learnt').className === 'warning'";
+    assert_eq!(page.browser.run(is_warning, &[]).unwrap(), json!(true));
+    page.screenshot("versions-1-turned");
+    page.assert_accessible("a turned hand");
+
+    page.click("#tab-teach");
+    for number in [1, 2] {
+        page.click(&format!("#version-list li:nth-child({number}) input"));
+        page.settle_frames();
+    }
+    page.click("#version-list li:nth-child(2) button");
+    patiently(&page, "the table", "return document.querySelector('#compared table') !== null");
+    let compared = page.text("#compared");
+    assert!(compared.starts_with("In 1 picture the hand is turned: other.png."), "{compared}");
+    assert!(compared.contains("≠ hand turned") && !compared.contains('✓'), "{compared}");
+    page.screenshot("versions-2-compared");
+    page.assert_accessible("versions that differ");
+
+    // For a part that looks the same after half a turn, it is the same grasp.
+    page.click("#tab-mark");
+    page.click("#turn-around");
+    page.settle();
+    page.click("#tab-teach");
+    page.browser.run("document.querySelector('[name=symmetry][value=\"2\"]').click()", &[]).unwrap();
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 3");
+    page.click("#tab-try");
+    let learnt = patiently(&page, "no change", LEARNT);
+    assert!(learnt.as_str().unwrap().ends_with("No picture has changed."), "{learnt}");
+    // After loading the page again, the symmetry of the model in use is chosen.
+    page.browser.run("window.isOld = true; location.reload()", &[]).unwrap();
+    page.wait_for("the page again", "return !window.isOld && document.querySelectorAll('.todo li.done').length === 3");
+    page.click("#tab-teach");
+    page.wait_for("its symmetry", "return document.querySelector('[name=symmetry]:checked').value === '2'");
+    page.browser.run("document.querySelector('[name=symmetry][value=\"1\"]').click()", &[]).unwrap();
+    page.wait_for("the old result", "return !document.getElementById('teach-old').hidden");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_version_that_is_clearly_worse_is_warned_of() {
+    let page = taught();
+    // The results of a second version are made up, after the page has asked for the versions.
+    let worse = "return new Promise((done) => setTimeout(done, 500)).then(() => import('/page/store.js')).then(({ state, changed }) => {
+        const [model] = state.models;
+        Object.assign(model.summary.figures, { found: [19, 19], wrong: 0, false_alarms: [0, 5] });
+        const worse = structuredClone({ ...model, id: 1 });
+        Object.assign(worse.summary.figures, { found: [14, 19], wrong: 5, false_alarms: [1, 5] });
+        state.models = [{ ...model, is_current: false }, worse];
+        changed();
+    })";
+    page.browser.run(worse, &[]).unwrap();
+    page.wait_for("the warning", "return !document.querySelector('#panel-try .worse').hidden");
+    let told = page.text("#panel-try .worse");
+    assert!(told.starts_with("Model 2 is worse on new samples than Model 1: 14 of 19 found, 5 wrong"), "{told}");
+    page.screenshot("versions-3-worse");
+    page.assert_accessible("a worse version");
+    page.click("#panel-try .worse button");
+    page.wait_for("no warning", "return document.querySelector('#panel-try .worse').hidden");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn while_the_first_model_is_taught_the_last_step_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
+    let marks = repository().join("datasets/demonstrations/pendulum/annotation.json");
+    std::fs::copy(marks, folder.path().join("photo.json")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
+    page.click("#tab-teach");
+    page.unfold("#more");
+    page.fill("#steps", "100000");
+    page.click("#teach-start");
+    page.click("#tab-try");
+    add(&page, &[("other.png".to_owned(), photo())]);
+    patiently(&page, "a step", "return /\\(Step \\d+ of 100000/.test(document.getElementById('try-intro').innerText)");
+    let intro = page.text("#try-intro");
+    assert!(intro.starts_with("A model is being taught (") && intro.contains("can be added already"), "{intro}");
+    assert!(!page.text("#panel-try").contains("learns from your answers"), "{}", page.text("#panel-try"));
+    page.unfold("#region-fold");
+    assert!(page.text("#region-text").starts_with("A model is being taught"), "{}", page.text("#region-text"));
+    let off = "return [...document.getElementById('region-form').elements].every((control) => control.disabled)";
+    assert_eq!(page.browser.run(off, &[]).unwrap(), json!(true));
+    page.screenshot("versions-4-teaching");
+    page.assert_accessible("trying while a model is taught");
+    page.click("#tab-teach");
+    page.click("#teach-stop");
+    patiently(&page, "the end", "return !document.getElementById('teach-form').hidden");
+    page.assert_quiet();
+}
