@@ -171,6 +171,25 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
+    /// Finds the part for a plan from one picture, which does not measure its height: at its given or taught height, and
+    /// only if it is not found there at any of the possible heights.
+    ///
+    /// # Errors
+    /// As for [`PartFinder::find`].
+    pub fn find_for_plan<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>>
+    where
+        P: Pictures<A>,
+    {
+        let is_sure = |target: &GraspTarget| target.score >= sdg_robot::SURE;
+        let heights_m = self.heights_m.take();
+        let found = self.find(arm).map(|found| found.filter(is_sure));
+        self.heights_m = heights_m;
+        match found? {
+            None if self.heights_m.is_some() => Ok(self.find(arm)?.filter(is_sure)),
+            found => Ok(found),
+        }
+    }
+
     /// All parts in a picture, best first.
     fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
     where

@@ -224,7 +224,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         finder.places.clone_from(&prepared.workcell.places);
     }
     if args.dry_run {
-        let target = finder.find(arm)?.filter(|target| target.score >= sdg_robot::SURE);
+        let target = finder.find_for_plan(arm)?;
         dry_run(args, prepared, arm, limits.clone(), target, finder.seen())?;
     }
     if args.dry_run || address.is_some() {
