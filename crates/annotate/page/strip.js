@@ -77,7 +77,7 @@ export function showCurrent() {
   document.getElementById("photo").hidden = !shown;
   empty.hidden = Boolean(shown);
   if (shown) show(...shown);
-  else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : state.tab === "try" ? "Drop pictures of the table here, or add them on the side." : "Drop a photo of the part here, or choose it on the side.";
+  else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : state.tab === "try" ? "Drop pictures of the table here, or press “Add pictures…”." : "Drop a photo of the part here, or press “Choose it…”.";
   changed();
 }
 

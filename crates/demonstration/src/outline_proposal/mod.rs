@@ -64,12 +64,7 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[Out
 ///
 /// The result is like that of [`propose_outline`]: in the box, in steps of the reduced photo, and the box itself if
 /// nothing is left.
-pub fn correct_outline(
-    image: &RgbImage,
-    bbox: &BoundingBox,
-    outline: &Polygon,
-    strokes: &[OutlineStroke],
-) -> Polygon {
+pub fn correct_outline(image: &RgbImage, bbox: &BoundingBox, outline: &Polygon, strokes: &[OutlineStroke]) -> Polygon {
     outline_in(image, bbox, Some(outline), strokes)
 }
 
