@@ -8,31 +8,32 @@ import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `foundBy`: how each proposed outline was found; `waiting`: strokes not yet answered. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, foundBy: new Map(), waiting: [] };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
 }
 
-/** Makes the current marks an undoable step, and saves them. */
-export function commit() {
+/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
+export function commit(found = null) {
   const target = image();
   const now = JSON.stringify(target.marks, round);
   target.marks = JSON.parse(now);
-  if (now !== target.committed) {
-    target.past.push(target.committed);
+  if (now !== target.committed || found?.strokes.length) {
+    target.past.push([target.committed, target.found]);
     target.future = [];
     target.committed = now;
     save(target);
   }
+  if (found) target.found = { ...found, outline: keyOf(target) };
   changed();
 }
 
 function travel(from, to) {
   const target = image();
   if (!from(target).length) return;
-  to(target).push(target.committed);
-  target.committed = from(target).pop();
+  to(target).push([target.committed, target.found]);
+  [target.committed, target.found] = from(target).pop();
   target.marks = JSON.parse(target.committed);
   target.waiting = [];
   Object.assign(state, { draft: null, vertex: null });
@@ -98,10 +99,10 @@ export function setGripper(gripper) {
 
 /** After a box was drawn: its outline is detected unless there is one, and the gripper is next. */
 export function boxDrawn() {
-  // Strokes are now applied within this box.
-  image().foundBy.delete(keyOf(image()));
   state.selected = "box";
   commit();
+  // Strokes are now applied within this box.
+  image().found = null;
   state.tool = nextTool();
   showBox(marks().box);
   if (!marks().outline) proposeOutline({ quietly: true });
@@ -128,7 +129,7 @@ const boxOf = ({ marks: { box, outline } }) => box ?? (outline && boundsOf(outli
 const keyOf = ({ marks: { outline } }) => JSON.stringify(outline);
 
 /** How a photo's outline was found: the outline that strokes corrected (null: detected in the box), the strokes, and the box within which they apply. An outline that was drawn, changed by hand or loaded is itself the one to correct. */
-const howFound = (target) => target.foundBy.get(keyOf(target)) ?? { base: target.marks.outline, strokes: [], box: null };
+const howFound = (target) => (target.found?.outline === keyOf(target) ? target.found : { base: target.marks.outline, strokes: [], box: null });
 
 /** The strokes of the shown outline and those waiting for an answer. */
 export const strokesOf = (target) => [...howFound(target).strokes, ...target.waiting];
@@ -163,7 +164,7 @@ function snapBox(marks) {
 /** The last detection of an outline: the next one begins after it. */
 let lastProposal = Promise.resolve();
 
-/** Places the gripper again after a stroke changed the outline: one that was placed by a click and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
+/** Places the gripper again after a stroke changed the outline: one that was placed by a click or turned to fit and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
 function followOutline(target) {
   const { grasp, outline } = target.marks;
   if (!grasp) return false;
@@ -174,8 +175,8 @@ function followOutline(target) {
   const isBeside = !isWithin(center, outline);
   if (!isPlaced && !isBeside) return false;
   const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
-  setGripper(placedAt(nearest, outline, { length: isPlaced ? null : length, before: angle }));
-  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round) };
+  setGripper(placedAt(nearest, outline, { length: isPlaced ? placed.length : length, before: angle }));
+  target.placed = { ...target.placed, point: nearest, grasp: JSON.stringify(target.marks.grasp, round) };
   return isBeside;
 }
 
@@ -214,8 +215,7 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       if (!target.marks.grasp) state.selected = "outline";
       if (isStroke && target.marks.box) snapBox(target.marks);
       const hasMoved = isStroke && followOutline(target);
-      commit();
-      target.foundBy.set(keyOf(target), { base, strokes, box: isStroke ? box : null });
+      commit({ base, strokes, box: isStroke ? box : null });
       const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!isStroke) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
@@ -317,6 +317,7 @@ export function turnToFit() {
   const moved = Math.max(norm(sub(fitted.center, gripper.center)), Math.abs(fitted.width - gripper.width));
   if (Math.abs(Math.sin(fitted.angle - gripper.angle)) < MIN_TURN && moved < MIN_MOVE_PX) return toast("The gripper already fits.");
   setGripper(fitted);
+  image().placed = { point: fitted.center, grasp: JSON.stringify(marks().grasp, round), length: gripper.length };
   commit();
 }
 

@@ -146,7 +146,7 @@ function renderAdvice({ advice }) {
       const item = document.createElement("li");
       item.dataset.code = remark.code;
       item.append(remark.text);
-      if (remark.code === "gripper_along") {
+      if (["gripper_along", "grasp_one_sided"].includes(remark.code)) {
         const button = document.createElement("button");
         button.textContent = "Turn to fit";
         button.addEventListener("click", turnToFit);
