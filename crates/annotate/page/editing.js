@@ -175,8 +175,9 @@ function followOutline(target) {
   const isBeside = !isWithin(center, outline);
   if (!isPlaced && !isBeside) return false;
   const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
-  setGripper(placedAt(nearest, outline, { length: isPlaced ? placed.length : length, before: angle }));
-  target.placed = { ...target.placed, point: nearest, grasp: JSON.stringify(target.marks.grasp, round) };
+  const kept = isPlaced ? placed.length : length;
+  setGripper(placedAt(nearest, outline, { length: kept, before: angle }));
+  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round), length: kept };
   return isBeside;
 }
 

@@ -63,7 +63,12 @@ export function showBox(box, least = state.view.scale) {
   const [wide, narrow, whole] = [scaleFor(0.5), scaleFor(0.8), wholeScale()];
   const scale = clamp(Math.max(wide < 1.25 * whole ? narrow : wide, Math.min(least, narrow)), MIN_SCALE, MAX_SCALE);
   if (scale <= whole) return fit();
-  move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
+  // In the middle, as far as no more than a margin beside the photo comes into view.
+  const offset = (side, extent, middle) => {
+    const hidden = side - extent * scale;
+    return hidden > 0 ? hidden / 2 : clamp(side / 2 - middle * scale, hidden - MARGIN_PX, MARGIN_PX);
+  };
+  move(scale, offset(clientWidth, shown[0], (x1 + x2) / 2), offset(clientHeight, shown[1], (y1 + y2) / 2));
   state.view.box = box;
 }
 
