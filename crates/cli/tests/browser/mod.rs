@@ -16,3 +16,4 @@ mod projects;
 mod region;
 mod small_screen;
 mod tried;
+mod zooming;
