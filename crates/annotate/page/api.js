@@ -85,7 +85,8 @@ export const api = {
   setRegion: (region) => inTurn(() => json("PUT", "/api/region", region)),
   // `keepalive`: marks made just before closing the page are saved too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
-  proposeOutline: (id, box, strokes) => json("POST", `/api/images/${id}/outline`, { box, strokes }),
+  // `outline`: the one that the strokes correct; null to detect it in the box.
+  proposeOutline: (id, box, strokes, outline) => json("POST", `/api/images/${id}/outline`, { box, strokes, outline }),
   removeImage: (id) => send("DELETE", `/api/images/${id}`),
   putBackImage: (id) => send("POST", `/api/images/${id}/put-back`),
   removeTrialPicture: (id) => send("DELETE", `/api/trial-pictures/${id}`),

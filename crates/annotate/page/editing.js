@@ -1,41 +1,41 @@
 // Changes of marks: undoable, saved at once.
 
 import { api, isLost, present } from "./api.js";
-import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, nearestWithin, placedAt } from "./geometry.js";
+import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, nearestWithin, norm, placedAt, sub } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo; `strokesOf`: the strokes with which each proposed outline was found. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, strokes: null, strokesOf: new Map(), drawnBox: null };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
 }
 
-/** Makes the current marks an undoable step, and saves them. */
-export function commit() {
+/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
+export function commit(found = null) {
   const target = image();
   const now = JSON.stringify(target.marks, round);
   target.marks = JSON.parse(now);
-  if (now !== target.committed) {
-    target.past.push(target.committed);
+  if (now !== target.committed || found?.strokes.length) {
+    target.past.push([target.committed, target.found]);
     target.future = [];
     target.committed = now;
     save(target);
   }
+  if (found) target.found = { ...found, outline: keyOf(target) };
   changed();
 }
 
 function travel(from, to) {
   const target = image();
   if (!from(target).length) return;
-  to(target).push(target.committed);
-  target.committed = from(target).pop();
+  to(target).push([target.committed, target.found]);
+  [target.committed, target.found] = from(target).pop();
   target.marks = JSON.parse(target.committed);
-  // An undone stroke does not count for the next one.
-  target.strokes = target.strokesOf.get(target.committed) ?? null;
+  target.waiting = [];
   Object.assign(state, { draft: null, vertex: null });
   save(target);
   changed();
@@ -99,9 +99,10 @@ export function setGripper(gripper) {
 
 /** After a box was drawn: its outline is detected unless there is one, and the gripper is next. */
 export function boxDrawn() {
-  image().drawnBox = null;
   state.selected = "box";
   commit();
+  // Strokes are now applied within this box.
+  image().found = null;
   state.tool = nextTool();
   showBox(marks().box);
   if (!marks().outline) proposeOutline({ quietly: true });
@@ -124,16 +125,25 @@ export function closeOutline(points) {
   state.tool = nextTool();
 }
 
-/** States that the area under a stroke belongs to the part or does not; the outline is detected again with all strokes. */
+const boxOf = ({ marks: { box, outline } }) => box ?? (outline && boundsOf(outline));
+const keyOf = ({ marks: { outline } }) => JSON.stringify(outline);
+
+/** How a photo's outline was found: the outline that strokes corrected (null: detected in the box), the strokes, and the box within which they apply. An outline that was drawn, changed by hand or loaded is itself the one to correct. */
+const howFound = (target) => (target.found?.outline === keyOf(target) ? target.found : { base: target.marks.outline, strokes: [], box: null });
+
+/** The strokes of the shown outline and those waiting for an answer. */
+export const strokesOf = (target) => [...howFound(target).strokes, ...target.waiting];
+
+/** States that the area under a stroke belongs to the part or does not; the outline is corrected by all of its strokes. */
 export function strokeOutline(points, isInside) {
   const target = image();
-  const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
+  const box = boxOf(target);
   if (!box) return toast("Draw a box around the part first: the outline is detected inside it.");
-  target.strokes = [...(target.strokes ?? []), { points, isInside }];
   // Areas of the part outside the box enlarge the box.
   const grown = boundsOf([box.slice(0, 2), box.slice(2), ...points]);
   if (isInside && String(grown) !== String(box)) setBox(grown);
-  return proposeOutline({ strokes: target.strokes });
+  target.waiting.push({ points, isInside });
+  return proposeOutline({ isStroke: true });
 }
 
 /** Maximum margin of a person's box around the outline, as a share of its side; a looser box is fitted to a corrected outline. */
@@ -151,56 +161,65 @@ function snapBox(marks) {
   if (Math.max(x1 - bx1, y1 - by1, bx2 - x2, by2 - y2) > most) setBox([x1 - room, y1 - room, x2 + room, y2 + room]);
 }
 
-/** Places the gripper again after a stroke changed the outline: one that was placed by a click and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
+/** The last detection of an outline: the next one begins after it. */
+let lastProposal = Promise.resolve();
+
+/** Places the gripper again after a stroke changed the outline: one that was placed by a click or turned to fit and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
 function followOutline(target) {
   const { grasp, outline } = target.marks;
   if (!grasp) return false;
   const { placed } = target;
   const isPlaced = placed?.grasp === JSON.stringify(grasp, round);
-  const { center, length } = gripperOf(grasp);
+  const { center, length, angle } = gripperOf(grasp);
   const point = isPlaced ? placed.point : center;
   const isBeside = !isWithin(center, outline);
   if (!isPlaced && !isBeside) return false;
   const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
-  setGripper(placedAt(nearest, outline, isPlaced ? null : length));
-  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round) };
+  const kept = isPlaced ? placed.length : length;
+  setGripper(placedAt(nearest, outline, { length: kept, before: angle }));
+  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round), length: kept };
   return isBeside;
 }
 
-/** Asks the server for the outline of the object in the box. `quietly`: without notes, if the user did not ask for it. */
-export async function proposeOutline({ quietly = false, strokes = null } = {}) {
+/** Asks the server for the outline of the object in the box, or for its correction by the waiting strokes. `quietly`: without notes, if the user did not ask for it. */
+export function proposeOutline(options = {}) {
   const target = image();
+  const propose = () => (target === image() ? detectOutline(target, options) : (target.waiting = []));
+  return (lastProposal = lastProposal.then(propose, propose));
+}
+
+async function detectOutline(target, { quietly = false, isStroke = false }) {
+  const { base, strokes: earlier, box: drawn } = isStroke ? howFound(target) : { base: null, strokes: [], box: null };
+  const added = isStroke ? [...target.waiting] : [];
+  // All waiting strokes were answered together, or taken back.
+  if (isStroke && !added.length) return;
+  const strokes = [...earlier, ...added];
   // Strokes are applied within the box that was drawn, even after the box was fitted to the outline.
-  const drawn = strokes && target.drawnBox;
-  const box = drawn ? boundsOf([drawn, target.marks.box].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
+  const own = boxOf(target);
+  const box = drawn && own ? boundsOf([drawn, own].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : own;
   if (!box) {
     setTool("box");
     return toast("Draw a box around the part first: the outline is detected inside it.");
   }
-  if (!strokes) Object.assign(target, { strokes: null, drawnBox: null });
   state.proposing = true;
   changed();
   try {
-    const said = (strokes ?? []).map(({ points, isInside }) => ({ points, is_inside: isInside }));
-    const { outline } = await api.proposeOutline(target.id, box, said);
-    // Marks changed in the meantime take precedence.
-    const waited = target === image() && !(quietly && target.marks.outline);
+    const said = strokes.map(({ points, isInside }) => ({ points, is_inside: isInside }));
+    const { outline } = await api.proposeOutline(target.id, box, said, base);
+    // Marks changed in the meantime take precedence, and strokes taken back do not count.
+    const waited = target === image() && !(quietly && target.marks.outline) && added.every((stroke) => target.waiting.includes(stroke));
     if (waited && !outline) {
       if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");
     } else if (waited) {
       const before = target.marks.outline;
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
-      if (strokes && target.marks.box) {
-        target.drawnBox = box;
-        snapBox(target.marks);
-      }
-      const hasMoved = strokes ? followOutline(target) : false;
-      commit();
-      target.strokesOf.set(target.committed, strokes);
-      const last = strokes?.at(-1);
+      if (isStroke && target.marks.box) snapBox(target.marks);
+      const hasMoved = isStroke && followOutline(target);
+      commit({ base, strokes, box: isStroke ? box : null });
+      const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
-      if (!strokes) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
+      if (!isStroke) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
       else if (!last.isInside && isWithin(middle, outline)) {
         toast("This place is inside the part. An outline is a single line without holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {
@@ -214,6 +233,7 @@ export async function proposeOutline({ quietly = false, strokes = null } = {}) {
   } catch (error) {
     if (!quietly) toast(error.message);
   }
+  target.waiting = target.waiting.filter((stroke) => !added.includes(stroke));
   state.proposing = false;
   changed();
 }
@@ -284,13 +304,21 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   commit();
 }
 
-/** Turns the gripper to the direction of the smallest opening over the part, centres it on the part across the line, and sets the opening. */
+/** Smaller changes are none: in radians and pixels. */
+const MIN_TURN = Math.PI / 360;
+const MIN_MOVE_PX = 0.5;
+
+/** Turns the gripper to the nearer direction of the smallest opening over the part, centres it on the part across the line, and sets the opening. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();
   if (!grasp || !part) return;
   const gripper = gripperOf(grasp);
-  setGripper({ ...gripper, ...placedAt(gripper.center, part, gripper.length) });
+  const fitted = placedAt(gripper.center, part, { length: gripper.length, before: gripper.angle });
+  const moved = Math.max(norm(sub(fitted.center, gripper.center)), Math.abs(fitted.width - gripper.width));
+  if (Math.abs(Math.sin(fitted.angle - gripper.angle)) < MIN_TURN && moved < MIN_MOVE_PX) return toast("The gripper already fits.");
+  setGripper(fitted);
+  image().placed = { point: fitted.center, grasp: JSON.stringify(marks().grasp, round), length: gripper.length };
   commit();
 }
 

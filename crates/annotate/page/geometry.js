@@ -90,8 +90,9 @@ export function reach({ center, angle, length }, part) {
   return { least: Math.min(...offsets), most: Math.max(...offsets) };
 }
 
-/** Step between the angles tried when a gripper is placed by a click: five degrees. */
+/** Angles tried when a gripper is placed: five degrees apart; then those around the best one, half a degree apart. */
 const TURNS = Array.from({ length: 36 }, (_, i) => (i * Math.PI) / 36 - Math.PI / 2);
+const FINE_TURNS = Array.from({ length: 21 }, (_, i) => ((i - 10) * Math.PI) / 360);
 /** Clearance between jaw and part of a placed gripper, as a share of the part's width, and its minimum in pixels. */
 const ROOM = 0.08;
 const MIN_ROOM_PX = 2;
@@ -157,20 +158,24 @@ export function alongSides(gripper, part) {
   return gripper.angle;
 }
 
-/** The gripper at `point`, rotated to the smallest width of the part and centred between its sides. */
-export function placedAt(point, part, jawLength = null) {
+/** The gripper at `point`, rotated to the smallest width of the part and centred between its sides. Of the two angles half a turn apart, the one nearer to `before` is used, if given. */
+export function placedAt(point, part, { length: jawLength = null, before = null } = {}) {
   const [x1, y1, x2, y2] = boundsOf(part);
   const length = jawLength ?? Math.max(Math.hypot(x2 - x1, y2 - y1) / 6, 12);
   let best = null;
-  for (const angle of TURNS) {
+  const tryAngle = (angle) => {
     const sides = reach({ center: point, angle, length }, part);
-    if (!sides || sides.least > 0 || sides.most < 0) continue;
+    if (!sides || sides.least > 0 || sides.most < 0) return;
     const width = sides.most - sides.least;
     if (!best || width < best.width - 1e-9) best = { angle, width, middle: (sides.least + sides.most) / 2 };
-  }
-  if (!best) return { center: point, angle: 0, length, width: length };
+  };
+  TURNS.forEach(tryAngle);
+  if (!best) return { center: point, angle: before ?? 0, length, width: length };
+  const coarse = best.angle;
+  FINE_TURNS.forEach((turn) => tryAngle(coarse + turn));
   const middled = (angle, middle) => add(point, times(quarter(direction(angle)), middle));
-  const angle = alongSides({ center: middled(best.angle, best.middle), angle: best.angle, width: best.width }, part);
+  const along = alongSides({ center: middled(best.angle, best.middle), angle: best.angle, width: best.width }, part);
+  const angle = before !== null && Math.cos(along - before) < 0 ? along + Math.PI : along;
   const { least, most } = reach({ center: point, angle, length }, part) ?? { least: -best.width / 2, most: best.width / 2 };
   return { center: middled(angle, (least + most) / 2), angle, length, width: withRoom(most - least) };
 }

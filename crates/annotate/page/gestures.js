@@ -130,7 +130,7 @@ function correcting(change) {
       change(toPhoto(at), event);
       changed();
     },
-    end: commit,
+    end: () => commit(),
   };
 }
 

@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { offBecause } from "./buttons.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
 import { gripperOf } from "./geometry.js";
-import { changed, image, isMarking, marks, state } from "./store.js";
+import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
 import { toast } from "./toast.js";
 
@@ -20,6 +20,15 @@ const DOES = {
   S: "shape",
 };
 const ORDER = ["C", "A", "B", "D", "S"];
+
+/** On a narrow screen, “In” and “Out” are in the toolbar above the photo: the panel is below it. */
+const narrow = matchMedia("(max-width: 860px)");
+function placeStrokeTools() {
+  if (narrow.matches) by("zoom-tools").before(by("in-out"));
+  else by("do-outline").append(by("in-out"));
+}
+narrow.addEventListener("change", placeStrokeTools);
+placeStrokeTools();
 
 for (const button of document.querySelectorAll("button[data-tool]")) {
   button.addEventListener("click", () => setTool(button.dataset.tool));
@@ -107,7 +116,10 @@ function renderTodo() {
   const noBox = !box && !outline && "Draw a box around the part first";
   for (const tool of ["in", "out"]) offBecause(document.querySelector(`button[data-tool=${tool}]`), noBox);
   offBecause(by("turn-to-fit"), noBox);
-  offBecause(document.querySelector("#panel-mark [data-next=samples]"), noBox);
+  const onward = document.querySelector("#panel-mark [data-next=samples]");
+  offBecause(onward, noBox);
+  // Without the grasp, going on is possible but is not the next step.
+  onward.classList.toggle("primary", isComplete(image()));
   by("grasp-numbers").hidden = !grasp;
   offBecause(by("propose"), state.proposing ? "The outline is being detected" : noBox);
   by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it again" : "Find it";
@@ -134,7 +146,7 @@ function renderAdvice({ advice }) {
       const item = document.createElement("li");
       item.dataset.code = remark.code;
       item.append(remark.text);
-      if (remark.code === "gripper_along") {
+      if (["gripper_along", "grasp_one_sided"].includes(remark.code)) {
         const button = document.createElement("button");
         button.textContent = "Turn to fit";
         button.addEventListener("click", turnToFit);
@@ -206,7 +218,7 @@ function renderTools() {
   offBecause(by("undo"), !image()?.past.length && "There is nothing to undo");
   offBecause(by("redo"), !image()?.future.length && "There is nothing to redo");
   offBecause(by("delete"), !(state.draft || (state.selected && image()?.marks[state.selected])) && "Select a mark first");
-  by("mark-tools").hidden = by("edit-tools").hidden = !marking;
+  by("mark-tools").hidden = by("edit-tools").hidden = by("in-out").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
   const text = marking ? hint() : "";
   if (by("hint").textContent !== text) by("hint").textContent = text;

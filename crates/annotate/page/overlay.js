@@ -1,6 +1,7 @@
 // The marks drawn over the photo. Elements are kept between frames, so that a focused handle keeps the focus.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
+import { strokesOf } from "./editing.js";
 import { image, isAccepted, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
@@ -10,6 +11,8 @@ const overlay = document.getElementById("overlay");
 const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 /** Distance between the end of the line and its knob, so that knob and jaws stay apart however small the gripper is. */
 export const KNOB_PX = 20;
+/** The same distance for the dots of a detection, which are not dragged. */
+const DETECTED_OUT_PX = 8;
 const JAW_PX = 12;
 /** If nothing is accepted, the best refused detection is shown if its score is at least this. */
 export const MIN_SHOWN = 0.002;
@@ -88,6 +91,17 @@ function drawOutline(outline, correcting) {
   });
 }
 
+/** A gripper's line with the dots at its ends, `out` beyond its jaws: white at the start, filled at the end. While correcting, handles take the place of the dots. */
+function drawLine(key, parent, { start, end, along }, out, isWithDots) {
+  const beyond = times(along, out);
+  const ends = [sub(start, beyond), add(end, beyond)];
+  element(`${key}/along`, "path", { class: "along", d: path(ends, false) }, parent);
+  ends.forEach(([cx, cy], i) => {
+    if (isWithDots) element(`${key}/dot${i}`, "circle", { class: i ? "dot to" : "dot", cx, cy, r: i ? 5 : 4 }, parent);
+  });
+  return ends;
+}
+
 /** The shapes of a gripper on the screen. */
 function gripperShapes(grasp) {
   const { center, angle, length, width } = gripperOf(grasp);
@@ -114,16 +128,15 @@ function gripperShapes(grasp) {
 
 function drawGrasp(grasp, correcting) {
   const parent = group("grasp", "grasp");
-  const { along, jaws, between, start, end } = gripperShapes(grasp);
-  const out = times(along, KNOB_PX);
+  const shapes = gripperShapes(grasp);
+  const { jaws, between, start, end } = shapes;
   const body = correcting
     ? handle("grasp/body", parent, { kind: "grasp", body: "" }, "Gripper: move it with the arrow keys", "body")
     : group("grasp/body", "grasp");
   if (!correcting) parent.append(body);
   element("grasp/between", "path", { class: "between", d: path(between) }, body);
   element("grasp/along/rim", "path", { class: "rim", d: path([start, end], false) }, parent);
-  const reachOut = correcting ? [sub(start, out), add(end, out)] : [start, end];
-  element("grasp/along", "path", { class: "along", d: path(reachOut, false) }, parent);
+  const ends = drawLine("grasp", parent, shapes, KNOB_PX, !correcting);
   jaws.forEach(({ pad, arrow }, i) => {
     const holder = correcting ? handle(`grasp/jaw${i}`, parent, { kind: "grasp", jaw: i }, `Jaw ${i + 1}: open and close`) : parent;
     if (correcting) element(`grasp/jaw${i}/reach`, "path", { class: "reach", d: path(arrow.concat(pad)) }, holder);
@@ -132,9 +145,9 @@ function drawGrasp(grasp, correcting) {
   });
   if (!correcting) return;
   const from = handle("grasp/start", parent, { kind: "grasp", end: "start" }, "Gripper, start of its line: turn", "end");
-  knob("grasp/start", from, sub(start, out), 6);
+  knob("grasp/start", from, ends[0], 6);
   const to = handle("grasp/end", parent, { kind: "grasp", end: "end" }, "Gripper, end of its line: turn", "end to");
-  knob("grasp/end", to, add(end, out), 7);
+  knob("grasp/end", to, ends[1], 7);
 }
 
 function drawDraft(draft) {
@@ -180,10 +193,10 @@ function drawDetection(detection, i, count, detections) {
     const within = element(`found${i}/outline`, "g", { class: "outline" }, parent);
     line(`found${i}/outline`, within, path(outline.map(toScreen)));
   }
-  const { jaws, start, end } = gripperShapes(grasp);
+  const shapes = gripperShapes(grasp);
   const gripper = element(`found${i}/grasp`, "g", { class: "grasp" }, parent);
-  element(`found${i}/along`, "path", { class: "along", d: path([start, end], false) }, gripper);
-  jaws.forEach(({ pad, arrow }, j) => {
+  drawLine(`found${i}`, gripper, shapes, DETECTED_OUT_PX, true);
+  shapes.jaws.forEach(({ pad, arrow }, j) => {
     element(`found${i}/pad${j}`, "path", { class: "jaw", d: path(pad) }, gripper);
     element(`found${i}/arrow${j}`, "path", { class: "arrow", d: path(arrow) }, gripper);
   });
@@ -232,7 +245,7 @@ export function renderOverlay() {
     if (box) drawBox(box, correcting);
     if (grasp) drawGrasp(grasp, correcting);
     const { draft } = state;
-    if (state.tool === "in" || state.tool === "out") drawStrokes([...(image().strokes ?? []), ...(draft?.kind === "stroke" ? [draft] : [])]);
+    if (state.tool === "in" || state.tool === "out") drawStrokes([...strokesOf(image()), ...(draft?.kind === "stroke" ? [draft] : [])]);
     if (state.draft) drawDraft(state.draft);
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();

@@ -100,7 +100,7 @@ export async function sendKept(project) {
     const target = state.images.find((image) => image.name === name);
     // Marks changed elsewhere since then are not overwritten.
     if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
-    target.past.push(target.committed);
+    target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
     sent.push(save(target).then(() => target.saved.state === "written"));
   }

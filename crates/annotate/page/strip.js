@@ -95,7 +95,7 @@ export function showCurrent() {
     replacePicture(shown[0]);
     photo.alt = shown[2];
   } else if (shown) show(...shown);
-  else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : state.tab === "try" ? "Drop pictures of the table here, or add them on the side." : "Drop a photo of the part here, or choose it on the side.";
+  else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : state.tab === "try" ? "Drop pictures of the table here, or press “Add pictures…”." : "Drop a photo of the part here, or press “Choose it…”.";
   changed();
 }
 

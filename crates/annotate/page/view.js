@@ -39,21 +39,37 @@ export function replacePicture(url) {
   photo.src = url;
 }
 
-export function fit() {
+/** The scale at which the whole photo is shown. */
+function wholeScale() {
   const { clientWidth, clientHeight } = stage;
   const room = Math.min(MARGIN_PX, clientWidth / 20);
-  const scale = Math.min((clientWidth - 2 * room) / shown[0], (clientHeight - 2 * room) / shown[1]);
+  return Math.min((clientWidth - 2 * room) / shown[0], (clientHeight - 2 * room) / shown[1]);
+}
+
+export function fit() {
+  const { clientWidth, clientHeight } = stage;
+  const scale = wholeScale();
   const [x, y] = [(clientWidth - shown[0] * scale) / 2, (clientHeight - shown[1] * scale) / 2];
   // A hidden stage has no size: it is fitted as soon as it has one.
   state.view = scale > 0 ? { scale, x, y, fitted: true } : { ...state.view, fitted: true };
   changed();
 }
 
-/** Shows a box of the photo, with a margin of its size. */
-export function showBox([x1, y1, x2, y2]) {
+/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is not reduced, except from `least` as far as the box would not be visible. */
+export function showBox(box, least = state.view.scale) {
+  const [x1, y1, x2, y2] = box;
   const { clientWidth, clientHeight } = stage;
-  const scale = clamp(Math.min(clientWidth / (2 * (x2 - x1)), clientHeight / (2 * (y2 - y1))), MIN_SCALE, MAX_SCALE);
-  move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
+  const scaleFor = (share) => Math.min((share * clientWidth) / (x2 - x1), (share * clientHeight) / (y2 - y1));
+  const [wide, narrow, whole] = [scaleFor(0.5), scaleFor(0.8), wholeScale()];
+  const scale = clamp(Math.max(wide < 1.25 * whole ? narrow : wide, Math.min(least, narrow)), MIN_SCALE, MAX_SCALE);
+  if (scale <= whole) return fit();
+  // In the middle, as far as no more than a margin beside the photo comes into view.
+  const offset = (side, extent, middle) => {
+    const hidden = side - extent * scale;
+    return hidden > 0 ? hidden / 2 : clamp(side / 2 - middle * scale, hidden - MARGIN_PX, MARGIN_PX);
+  };
+  move(scale, offset(clientWidth, shown[0], (x1 + x2) / 2), offset(clientHeight, shown[1], (y1 + y2) / 2));
+  state.view.box = box;
 }
 
 /** Zooms by `factor` and keeps the point under `at` (on the screen) fixed. */
@@ -88,4 +104,17 @@ export function renderView() {
   document.getElementById("zoom").textContent = `${Math.round(scale * 100)} %`;
 }
 
-new ResizeObserver(() => (state.view.fitted ? fit() : changed())).observe(stage);
+/** The stage's last size. */
+let [lastWidth, lastHeight] = [0, 0];
+
+/** After a change of the stage's size: the photo, or the box shown before, is fitted again; otherwise the middle stays in the middle. */
+new ResizeObserver(() => {
+  const { clientWidth, clientHeight } = stage;
+  // In the step without a photo the stage has no size.
+  if (!clientWidth) return;
+  const { scale, x, y, fitted, box } = state.view;
+  if (fitted) fit();
+  else if (box) showBox(box, 0);
+  else move(scale, x + (clientWidth - lastWidth) / 2, y + (clientHeight - lastHeight) / 2);
+  [lastWidth, lastHeight] = [clientWidth, clientHeight];
+}).observe(stage);

@@ -24,6 +24,10 @@ const MAX_OPENING: f64 = 2.0;
 /// Maximum clearance of the jaws as a share of the part's width; wider jaws were left open by mistake.
 const MAX_CLEARANCE: f64 = 1.0;
 
+/// Minimum share of the part's width on either side of the gripper's middle; below it one jaw pushes the part far before
+/// the other touches it. The shipped demonstrations have at least 0.27.
+const MIN_SIDE_SHARE: f64 = 0.25;
+
 const HAND_TOO_SMALL: &str = "The part is wider here than the hand opens. Grasp it elsewhere, or turn the gripper.";
 
 /// The result of checking the marks of one picture.
@@ -154,6 +158,9 @@ fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
         }
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
+    } else if marks.outline.is_some() && reach.left.min(reach.right) < MIN_SIDE_SHARE * (reach.left + reach.right) {
+        let text = "The gripper is near one edge of the part: one jaw would push the part. Move it to the middle.";
+        remarks.push(remark("grasp_one_sided", text, None));
     } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
         let text = "The jaws are far from the part. Close them until they almost touch it.";
         remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
@@ -269,6 +276,8 @@ mod tests {
     fn other_grasps_that_cannot_be_meant_are_told() {
         assert_eq!(codes(&with_grasp([180.0, 130.0], [220.0, 130.0], 200.0)), ["gripper_wide"]);
         assert_eq!(codes(&with_grasp([180.0, 300.0], [220.0, 300.0], 60.0)), ["grasp_off_middle"]);
+        assert_eq!(codes(&with_grasp([180.0, 112.0], [220.0, 112.0], 98.0)), ["grasp_one_sided"]);
+        assert_eq!(codes(&with_grasp([180.0, 118.0], [220.0, 118.0], 86.0)), [""; 0]);
         assert_eq!(codes(&with_grasp([400.0, 130.0], [440.0, 130.0], 60.0)), ["grasp_beside"]);
         assert_eq!(codes(&with_grasp([196.0, 130.0], [204.0, 130.0], 66.0)), ["line_short"]);
     }

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::served;
 use sdg_demonstration::{Annotation, ImageFacts};
+use sdg_geometry::Polygon;
 use serde_json::{Value, json};
 use served::Served;
 
@@ -57,6 +58,27 @@ fn marks_are_written_as_they_are_made() {
     assert_eq!(refused["saved"]["state"], "refused");
     assert!(refused["saved"]["why"].as_str().unwrap().contains("does not cross itself"));
     assert!(Annotation::read(&std::fs::read(&file).unwrap(), &FACTS).is_ok(), "the last good marks stand");
+}
+
+#[test]
+fn strokes_correct_an_outline_that_was_drawn() {
+    let served = Served::start();
+    // Half of the bar, and a triangle of the table above it, which no detection would find.
+    let drawn = json!([[40, 60], [40, 40], [60, 20], [80, 40], [90, 40], [90, 60]]);
+    let stroke = json!({"points": [[110, 50], [130, 50]], "is_inside": true});
+    let mut request = json!({"box": [38, 18, 142, 62], "strokes": [stroke]});
+    let has = |request: &Value, [x, y]: [f64; 2]| {
+        let answer = served.ask("POST", "/api/images/0/outline", request.to_string().as_bytes()).json();
+        let points: Vec<[f64; 2]> = serde_json::from_value(answer["outline"].clone()).unwrap();
+        Polygon { vertices: points.into_iter().map(Into::into).collect() }.contains(&[x, y].into())
+    };
+    let [table, far_end] = [[60.0, 32.0], [120.0, 50.0]];
+    assert!(has(&request, far_end) && !has(&request, table), "detected");
+    request["outline"] = drawn;
+    assert!(has(&request, far_end) && has(&request, table), "corrected");
+    request["outline"] = json!([[40, 60], [40, 40]]);
+    let refused = served.ask("POST", "/api/images/0/outline", request.to_string().as_bytes());
+    assert!((400..500).contains(&refused.status) && refused.text().contains("outline"), "{}", refused.text());
 }
 
 #[test]

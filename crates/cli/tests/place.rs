@@ -79,7 +79,7 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
     let out = folder.path("drawn");
     let dry = sdg(&[&call[..], &["--dry-run", "--out", &out]].concat());
     let told = String::from_utf8(dry.stderr).unwrap();
-    assert!(dry.status.success() && told.contains("down softly until contact, about "), "{told}");
+    assert!(dry.status.success() && told.contains("down softly to about "), "{told}");
     assert!(told.ends_with("nothing was moved\n"), "{told}");
 
     let done = sdg(&[&call[..], &["--json", "--out", &out]].concat());

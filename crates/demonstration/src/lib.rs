@@ -74,7 +74,7 @@ pub use format::{AnnotationFormat, DeclaredImage};
 pub use label_file::LabelFile;
 pub use labelled_instance::LabelledInstance;
 pub use model_kind::{ModelKind, UnknownModel};
-pub use outline_proposal::{OutlineStroke, propose_outline, propose_outline_with};
+pub use outline_proposal::{OutlineStroke, correct_outline, propose_outline, propose_outline_with};
 pub use reading::{MarksReading, marks_fit, other_reading};
 pub use sdg_picture::{
     IMAGE_EXTENSIONS, ImageLimits, PictureError, PixelFrame, decode_image, decode_image_in, is_turned_by_exif,

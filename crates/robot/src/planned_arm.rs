@@ -17,9 +17,9 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// A descent until a contact, which is assumed at its expected height.
+    /// A compliant descent: of a held part until the contact with its place, of an open hand to the grasp.
     Down {
-        /// Joint positions at the contact, rad.
+        /// Joint positions at the end, rad.
         end: JointVector,
         /// Duration of the descent, s.
         duration_secs: f64,
@@ -159,7 +159,10 @@ impl Arm for PlannedArm {
 impl CompliantArm for PlannedArm {
     /// Assumes the contact at its expected height: [`TouchDown::below_table_m`] above the end of the path.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
-        let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
+        // A held part touches its place before the path's end; the open hand of an approach touches nothing.
+        let is_contact = self.hand.is_grasping;
+        let after_contact_m = if is_contact { touch_down.below_table_m } else { 0.0 };
+        let way_m = (touch_down.max_way_m - after_contact_m).max(0.0);
         let mut base_from_tcp = self.geometry.forward(&self.state.q);
         base_from_tcp.translation.z -= way_m;
         let end = *self.geometry.straight_path(&self.state.q, &base_from_tcp, &LineOptions::default())?.end();
@@ -168,7 +171,7 @@ impl CompliantArm for PlannedArm {
         (self.state.q, self.state.q_commanded) = (end, end);
         self.actions.push(PlannedAction::Down { end, duration_secs });
         let (tcp_height_m, force_n) = (base_from_tcp.translation.z, touch_down.press_n);
-        Ok(Touched { is_contact: true, tcp_height_m, force_n, peak_n: force_n, free_air_error: [0.0; 2] })
+        Ok(Touched { is_contact, tcp_height_m, force_n, peak_n: force_n, free_air_error: [0.0; 2] })
     }
 }
 

@@ -205,7 +205,7 @@ fn a_target_out_of_reach_is_a_failure_to_hover() {
         Some(GraspTarget { base_from_tcp: far, ..true_target() })
     });
     assert_eq!(step, GraspStep::Hover);
-    assert!(why.starts_with("the part at (1.40, 0.20) m is out of reach"), "{why}");
+    assert!(why.starts_with("the camera cannot be moved above the part at (1.40, 0.20) m"), "{why}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Requests about marked pictures.
 
 use sdg_demonstration::OutlineStroke;
-use sdg_geometry::BoundingBox;
+use sdg_geometry::{BoundingBox, Polygon};
 use serde::{Deserialize, Serialize};
 
 use super::answers::{json_of, picture_of, read};
@@ -35,6 +35,9 @@ struct BoxRequest {
     /// Strokes in the order in which they were drawn.
     #[serde(default)]
     strokes: Vec<StrokeRequest>,
+    /// The outline that the strokes correct; without one, it is detected in the box.
+    #[serde(default)]
+    outline: Option<Vec<[f64; 2]>>,
 }
 
 #[derive(Deserialize)]
@@ -56,7 +59,7 @@ struct Proposal {
 }
 
 fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal> {
-    let BoxRequest { bbox: [x1, y1, x2, y2], strokes } = read("box", body)?;
+    let BoxRequest { bbox: [x1, y1, x2, y2], strokes, outline } = read("box", body)?;
     let most = strokes.iter().map(|stroke| stroke.points.len()).max().unwrap_or(0);
     if strokes.len() > MAX_STROKES || most > MAX_POINTS {
         return Err(Error::Request {
@@ -76,6 +79,12 @@ fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal
         is_inside,
     };
     let strokes: Vec<_> = strokes.into_iter().map(of).collect();
-    let outline = outline::propose(&picture.pixels()?, &bbox, &strokes);
+    let known = outline.map(|points| Polygon::new(points.into_iter().map(Into::into).collect()));
+    let known = known.transpose().map_err(|error| Error::Request {
+        what: "outline",
+        expected: "a polygon".into(),
+        found: error.to_string(),
+    })?;
+    let outline = outline::propose(&picture.pixels()?, &bbox, known.as_ref(), &strokes);
     Ok(Proposal { outline: outline.map(|outline| outline.vertices.into_iter().map(Into::into).collect()) })
 }

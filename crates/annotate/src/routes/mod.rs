@@ -20,7 +20,7 @@
 //! | `PUT /api/images/{id}/marks` | stores and writes marks; returns the result of checking them |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | removes the picture from the session; its file is kept |
 //! | `POST /api/images/{id}/put-back`, `/api/trial-pictures/{id}/put-back` | restores a removed picture |
-//! | `POST /api/images/{id}/outline` | proposes an outline from a box and strokes; null if nothing differs from its surroundings |
+//! | `POST /api/images/{id}/outline` | proposes an outline from a box, or corrects one, with strokes; null if nothing differs from its surroundings |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | progress of the teaching; starts it; ends it with its current result |
 //! | `POST /api/trial-pictures?name=` | adds a picture to try |

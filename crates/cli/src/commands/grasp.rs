@@ -16,7 +16,7 @@ use sdg_robot::height::HeightReport;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget,
-    PartFinder, PlaceGoal, PlacingConfig, Robot, SafetyLimits, TouchDown,
+    PlaceGoal, PlacingConfig, Robot, SafetyLimits, TouchDown,
 };
 use serde_json::{Value, json};
 
@@ -238,6 +238,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         }
     }
     let started = Instant::now();
+    let started_secs = arm.state()?.time_secs;
     let camera_pose = prepared.camera.pose;
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = run_sequence(&mut robot, &mut finder, camera_pose, &prepared.config, prepared.place.as_ref());
@@ -250,7 +251,9 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         write_states(&args.states, robot.watch())?;
     }
     let ended = ended?;
-    print_report(args, prepared, &ended, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
+    // By the arm's own clock: a simulated arm moves faster or slower than a real one.
+    let secs = robot.state().map_or(started.elapsed().as_secs_f64(), |state| state.time_secs - started_secs);
+    print_report(args, prepared, &ended, secs, address.unwrap_or("sim"))
 }
 
 /// Plans from the arm's current posture; draws and prints the plan.
@@ -290,7 +293,11 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
         let (sigma_mm, source) = (1e3 * height.sigma_m, height.source.name());
         eprintln!("its marks are {height_mm:.1} ± {sigma_mm:.1} mm above the table, as {source}");
     }
-    let took = format!("the arm took {secs:.1} s of {:.1} s since the start", clock::elapsed_secs());
+    let total_secs = clock::elapsed_secs();
+    let took = match robot {
+        "sim" => format!("{secs:.1} s of the arm's time, simulated in {total_secs:.1} s"),
+        _ => format!("the arm took {secs:.1} s of {total_secs:.1} s since the start"),
+    };
     match (failed, &prepared.place) {
         (None, None) => {
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);

@@ -20,7 +20,7 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
             PlannedAction::Wait(_) => {}
             PlannedAction::Down { end, duration_secs } => {
                 let z_mm = geometry.forward(end).translation.z * 1e3;
-                eprintln!("  down softly until contact, about {z_mm:.0} mm, in {duration_secs:.1} s");
+                eprintln!("  down softly to about {z_mm:.0} mm, or until contact, in {duration_secs:.1} s");
             }
             PlannedAction::Hand(sdg_robot::HandCommand::Move { opening_m, .. }) => {
                 eprintln!("  hand open to {:.0} mm", opening_m * 1e3);

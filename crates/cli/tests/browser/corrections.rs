@@ -7,7 +7,7 @@ use sdg_demonstration::propose_outline;
 use sdg_geometry::BoundingBox;
 use serde_json::json;
 
-use super::page::Page;
+use super::page::{HOLD, Page};
 
 /// A straight part in one of several shapes, and its pose.
 struct Straight {
@@ -82,6 +82,106 @@ fn a_gripper_on_a_straight_part_is_turned_along_its_axis() {
     let most = offs.iter().copied().fold(0.0, f64::max);
     println!("most {most:.2}°");
     assert!(most <= MAX_OFF_DEG, "{most}°");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_gripper_on_a_part_with_legs_fits_to_a_degree_in_the_nearer_direction() {
+    let page = Page::open();
+    // A body of 120 × 80 px with two legs: its outline has no straight side that is long enough to be followed.
+    let body = [[-60.0, -40.0], [60.0, -40.0], [60.0, -35.0], [110.0, -35.0], [110.0, -25.0], [60.0, -25.0]];
+    let part = body.into_iter().chain(body.into_iter().rev().map(|[x, y]| [x, -y]));
+    for angle_deg in [3.0, 17.0, 48.5, 121.0, 166.0f64] {
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        let outline: Vec<_> =
+            part.clone().map(|[x, y]| [300.0 + x * cos - y * sin, 250.0 + x * sin + y * cos]).collect();
+        for before_deg in [angle_deg + 20.0, angle_deg + 160.0, angle_deg - 170.0] {
+            let held = json!({"length": 30.0, "before": f64::to_radians(before_deg)});
+            let script = format!(
+                "return import('/page/geometry.js').then(({{ placedAt }}) => \
+                 placedAt([302, 248], {}, {held}).angle)",
+                json!(outline)
+            );
+            let turned = page.browser.run(&script, &[]).unwrap().as_f64().unwrap().to_degrees();
+            let off = (turned - angle_deg + 90.0).rem_euclid(180.0) - 90.0;
+            let turn = (turned - before_deg + 180.0).rem_euclid(360.0) - 180.0;
+            assert!(off.abs() < 1.0 && turn.abs() < 90.0, "{angle_deg}°, before {before_deg}°: {turned}°");
+        }
+    }
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn turn_to_fit_keeps_the_hand_s_direction_and_says_if_it_fits() {
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    let angle = |page: &Page| page.saved().grasp.unwrap().angle().degrees();
+    page.click("#turn-around");
+    let fitting = angle(&page);
+    page.fill("#grasp-angle", &format!("{:.0}", fitting - 20.0));
+    let turn = |from: f64, to: f64| (to - from + 180.0).rem_euclid(360.0) - 180.0;
+    assert!((turn(fitting, angle(&page)) + 20.0).abs() < 1.0);
+    page.click("#turn-to-fit");
+    assert!(turn(fitting, angle(&page)).abs() < 3.0, "{} of {fitting}", angle(&page));
+    let before = page.saved();
+    page.click("#turn-to-fit");
+    page.wait_for("a note", "return document.getElementById('toasts').innerText.includes('already fits')");
+    assert_eq!(page.saved(), before);
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    // From the part, so that the area is connected with it.
+    let stroke = |[x, y]: [f64; 2]| {
+        page.click("button[data-tool=in]");
+        let middle = [0.5 * (HOLD[0] + x), 0.5 * (HOLD[1] + y)];
+        page.browser.drag(&[HOLD, middle, [x, y]].map(|place| page.on_screen(place))).unwrap();
+        page.settle();
+    };
+    // Two corners of the box that contain only table.
+    let corners = [[270.0, 265.0], [380.0, 180.0]];
+    let has = |index: usize| page.saved().outline.unwrap().contains(&corners[index].into());
+    let strokes = "return document.querySelectorAll('#overlay .strokes .under').length";
+    let drawn = || page.browser.run(strokes, &[]).unwrap();
+    stroke(corners[0]);
+    assert!(has(0) && !has(1));
+    // A step between both strokes.
+    page.browser.press(&["g"]).unwrap();
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    stroke(corners[1]);
+    assert!(has(0) && has(1));
+    assert_eq!(drawn(), json!(2));
+    page.screenshot("corrections-4-strokes");
+    page.click("#undo");
+    assert!(has(0) && !has(1), "one stroke is taken back");
+    page.settle_frames();
+    assert_eq!(drawn(), json!(1));
+    page.click("#redo");
+    assert!(has(0) && has(1));
+    page.settle_frames();
+    assert_eq!(drawn(), json!(2));
+    page.click("#undo");
+    stroke(corners[1]);
+    assert!(has(0) && has(1), "the earlier stroke is kept by the next one");
+
+    // The page's strokes are gone after a reload; a new one corrects the saved outline.
+    page.browser.run("window.isOld = true; location.reload()", &[]).unwrap();
+    page.wait_for("the marks again", "return !window.isOld && document.querySelector('#do-outline.done') !== null");
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    stroke(HOLD);
+    assert_eq!(drawn(), json!(1));
+    assert!(has(0) && has(1), "the saved outline is corrected");
+    page.assert_quiet();
 }
 
 /// A light plate with a dark shadow to its right, on a grey table.

@@ -17,3 +17,4 @@ mod region;
 mod small_screen;
 mod tried;
 mod versions;
+mod zooming;

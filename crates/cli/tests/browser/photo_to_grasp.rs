@@ -70,6 +70,8 @@ fn mark(page: &Page) {
     let boxed = page.saved();
     let is_on = "return !document.querySelector('#panel-mark [data-next=samples]').disabled";
     page.wait_for("the way on", is_on);
+    let is_next_step = "return document.querySelector('#panel-mark [data-next=samples]').matches('.primary')";
+    assert_eq!(browser.run(is_next_step, &[]).unwrap(), Value::Bool(false), "the grasp is the next step");
     let close = |a: f64, b: f64| (a - b).abs() < 1.5;
     assert!(close(boxed.bbox.x1, BOX[0]) && close(boxed.bbox.y2, BOX[3]), "{:?}", boxed.bbox);
     assert_eq!(boxed.label, "pendulum");
@@ -87,11 +89,21 @@ fn mark(page: &Page) {
     browser.drag(&[page.on_screen(HOLD)]).unwrap();
     page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
     let placed = page.saved();
+    assert_eq!(browser.run(is_next_step, &[]).unwrap(), Value::Bool(true));
     let line = placed.grasp.unwrap();
     let turn = line.angle().degrees().rem_euclid(180.0);
     assert!((turn - 38.0).abs() < 12.0, "along the handle: {turn}°");
     assert!((line.center().x - HOLD[0]).abs() < 10.0 && (line.center().y - HOLD[1]).abs() < 10.0, "{line:?}");
     page.screenshot("2-marked");
+
+    // Dots at the line's ends show the hand's direction with the other tools, too.
+    browser.press(&["b"]).unwrap();
+    page.settle_frames();
+    let shown = dots_deg(page);
+    assert!(shown.len() == 1 && (shown[0] - line.angle().degrees()).to_radians().cos() > 0.999, "{shown:?}");
+    page.click("#do-grasp h2");
+    page.settle_frames();
+    assert!(dots_deg(page).is_empty(), "handles take their place");
 
     // Dragging one jaw outwards opens both; undo and redo work.
     let before = placed.jaw_width.unwrap();
@@ -136,6 +148,16 @@ fn mark(page: &Page) {
     assert_eq!(page.saved(), left);
     let lacking = page.text("#enough");
     assert!(lacking.contains("Enough for every model"), "{lacking}");
+}
+
+/// The directions from the white dots to the filled ones, in degrees.
+fn dots_deg(page: &Page) -> Vec<f64> {
+    let script = "const at = (dot) => [dot.cx.baseVal.value, dot.cy.baseVal.value];
+        return [...document.querySelectorAll('#overlay .dot.to')].map((to) => {
+            const [[x1, y1], [x2, y2]] = [at(to.parentNode.querySelector('.dot:not(.to)')), at(to)];
+            return Math.atan2(y2 - y1, x2 - x1) * 180 / Math.PI; })";
+    let told = page.browser.run(script, &[]).unwrap();
+    told.as_array().unwrap().iter().map(|degrees| degrees.as_f64().unwrap()).collect()
 }
 
 fn see_samples(page: &Page) {
@@ -212,6 +234,10 @@ fn try_on_another_picture(page: &Page) {
     patiently(page, "a grasp", "return document.querySelector('.found') !== null");
     assert!(page.text(".found").contains("Found the part"), "{}", page.text("#found"));
     page.screenshot("8-found");
+    // The part was turned by half a turn, and so is the shown direction.
+    let turned = before.angle().degrees() + 180.0;
+    let is_turned = |shown: &f64| ((shown - turned + 180.0).rem_euclid(360.0) - 180.0).abs() < 3.0;
+    assert!(dots_deg(page).iter().any(is_turned), "{:?}, expected {turned}°", dots_deg(page));
     page.assert_accessible("trying");
 
     // A confirmed detection becomes a demonstration beside the photo, with the grasp at the part's position.

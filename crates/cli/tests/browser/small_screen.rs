@@ -6,6 +6,47 @@ use super::page::{HOLD, Page};
 
 const STEPS: [&str; 4] = ["mark", "samples", "teach", "try"];
 
+/// Pairs of buttons and labels of the marks that overlap.
+const OVERLAPS: &str = "const items = [...document.querySelectorAll('.todo li')].flatMap((li) =>
+    [...li.querySelectorAll('button, label')].filter((e) => e.checkVisibility()).map((e) => [li, e]));
+    const meets = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+    const rect = (e) => e.getBoundingClientRect();
+    return items.filter(([, e]) => e.matches('[data-clear]')).flatMap(([li, e]) => items
+        .filter(([of, other]) => of === li && other !== e && meets(rect(e), rect(other)))
+        .map(([, other]) => `${e.innerText} ${other.innerText}`))";
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn stroke_tools_are_at_the_photo_and_no_button_covers_another() {
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    for (width, is_in_tools) in [(1280, false), (390, true), (360, true), (1280, false)] {
+        page.browser.emulate(width, 844, false).unwrap();
+        page.browser.run("scrollTo(0, 0)", &[]).unwrap();
+        page.settle_frames();
+        let placed = "return document.querySelector('#tools #in-out') !== null";
+        assert_eq!(page.browser.run(placed, &[]).unwrap(), json!(is_in_tools), "at {width} px");
+        assert_eq!(page.browser.run(OVERLAPS, &[]).unwrap(), json!([]), "at {width} px");
+        if is_in_tools {
+            let in_sight = "const r = document.querySelector('[data-tool=in]').getBoundingClientRect();
+                const stage = document.getElementById('stage').getBoundingClientRect();
+                return r.height >= 44 && r.bottom <= stage.top && stage.bottom <= innerHeight";
+            assert_eq!(page.browser.run(in_sight, &[]).unwrap(), json!(true), "at {width} px");
+            page.assert_accessible(&format!("stroke tools at {width} px"));
+        }
+    }
+    // They belong to the first step only.
+    page.browser.emulate(390, 844, false).unwrap();
+    page.click("#tab-try");
+    page.settle_frames();
+    let hidden = "return !document.getElementById('in-out').checkVisibility()";
+    assert_eq!(page.browser.run(hidden, &[]).unwrap(), json!(true));
+    page.assert_quiet();
+}
+
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn every_step_fits_a_small_screen_in_light_and_dark() {

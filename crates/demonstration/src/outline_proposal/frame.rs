@@ -85,12 +85,14 @@ impl Frame {
         self.colors.len() / self.width
     }
 
+    /// A point of the photo, in pixels of the frame.
+    fn place_of(&self, point: &Point2<f64>) -> Point2<f64> {
+        Point2::new((point.x - self.origin[0]) / self.scale[0], (point.y - self.origin[1]) / self.scale[1])
+    }
+
     /// The stroke in pixels of the frame, as far as it lies in the box; `None` outside the box.
     pub fn stroke(&self, stroke: &OutlineStroke) -> Option<Stroke> {
-        let in_frame = |at: &Point2<f64>| {
-            Point2::new((at.x - self.origin[0]) / self.scale[0], (at.y - self.origin[1]) / self.scale[1])
-        };
-        let points: Vec<_> = stroke.points.iter().map(in_frame).collect();
+        let points: Vec<_> = stroke.points.iter().map(|at| self.place_of(at)).collect();
         let mut pixels = Vec::new();
         let (first, last) = (points.first()?, points.last()?);
         for (from, to) in points.iter().zip(points.iter().skip(1)).chain([(first, first), (last, last)]) {
@@ -108,6 +110,14 @@ impl Frame {
         pixels.sort_unstable();
         pixels.dedup();
         (!pixels.is_empty()).then_some(Stroke { pixels, is_inside: stroke.is_inside })
+    }
+
+    /// The candidates inside an outline in the photo.
+    pub fn pixels_of(&self, outline: &Polygon) -> Vec<bool> {
+        let outline = Polygon { vertices: outline.vertices.iter().map(|v| self.place_of(v)).collect() };
+        let mask = outline.rasterize(self.width as u32, self.height() as u32);
+        let is_inside = |at: usize| mask.get((at % self.width) as u32, (at / self.width) as u32);
+        self.candidates.iter().enumerate().map(|(at, &candidate)| candidate && is_inside(at)).collect()
     }
 
     pub fn mask(&self, in_part: &[bool]) -> Mask {

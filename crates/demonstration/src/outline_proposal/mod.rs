@@ -56,10 +56,24 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
 /// The same, corrected by strokes in drawing order: each selects the piece of the picture on which it lies. Strokes
 /// outside the box are ignored.
 pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[OutlineStroke]) -> Polygon {
+    outline_in(image, bbox, None, strokes)
+}
+
+/// Corrects an existing outline by strokes in drawing order: areas far from all strokes stay as they are. Only the part
+/// of the outline inside the box counts.
+///
+/// The result is like that of [`propose_outline`]: in the box, in steps of the reduced photo, and the box itself if
+/// nothing is left.
+pub fn correct_outline(image: &RgbImage, bbox: &BoundingBox, outline: &Polygon, strokes: &[OutlineStroke]) -> Polygon {
+    outline_in(image, bbox, Some(outline), strokes)
+}
+
+/// The outline in the box, detected or corrected.
+fn outline_in(image: &RgbImage, bbox: &BoundingBox, known: Option<&Polygon>, strokes: &[OutlineStroke]) -> Polygon {
     let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
     let Some(frame) = Frame::cut_out(image, &inside, MAX_PIXELS) else { return nothing_found() };
-    let Some(in_part) = segment(&frame, strokes) else { return nothing_found() };
+    let Some(in_part) = segment(&frame, known, strokes) else { return nothing_found() };
     let Some(outline) = outer_outline(&frame.mask(&in_part)) else { return nothing_found() };
     // Pieces of the mask extend to the edges of whole pixels; the box may end within one.
     let outline = frame.in_photo(&outline, &inside);
@@ -70,9 +84,12 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[Out
     }
 }
 
-/// The part's pixels; `None` if nothing stands out.
-fn segment(frame: &Frame, strokes: &[OutlineStroke]) -> Option<Vec<bool>> {
-    let found = guesses::likeliest_cut(frame, ROUNDS);
+/// The part's pixels, from a known outline or detected; `None` if nothing stands out.
+fn segment(frame: &Frame, known: Option<&Polygon>, strokes: &[OutlineStroke]) -> Option<Vec<bool>> {
+    let found = match known {
+        Some(outline) => Some(frame.pixels_of(outline)),
+        None => guesses::likeliest_cut(frame, ROUNDS),
+    };
     let strokes: Vec<_> = strokes.iter().filter_map(|stroke| frame.stroke(stroke)).collect();
     if strokes.is_empty() {
         return found;
@@ -127,6 +144,23 @@ mod tests {
         let bbox = BoundingBox { x1: 57.0, y1: 47.0, x2: 143.0, y2: 113.0 };
         let area = propose_outline(&image, &bbox).area();
         assert!((area / 4800.0 - 1.0).abs() < 0.05, "{area}");
+    }
+
+    #[test]
+    fn a_known_outline_is_corrected_at_the_stroke_and_kept_elsewhere() {
+        // The outline lacks the disc's left side and has a corner of the table, which only a person would draw.
+        let (image, bbox) = disc(200, 50.0);
+        let drawn = [[80.0, 55.0], [148.0, 48.0], [148.0, 140.0], [80.0, 145.0]];
+        let drawn = Polygon { vertices: drawn.into_iter().map(Into::into).collect() };
+        assert_eq!(propose_outline_with(&image, &bbox, &[]), propose_outline(&image, &bbox));
+        let unchanged = correct_outline(&image, &bbox, &drawn, &[]);
+        assert!((unchanged.area() / drawn.area() - 1.0).abs() < 0.02, "{} of {}", unchanged.area(), drawn.area());
+        let corner = Point2::new(145.0, 52.0);
+        let missing = Point2::new(60.0, 100.0);
+        assert!(unchanged.contains(&corner) && !unchanged.contains(&missing));
+        let points = [85.0, 100.0, 115.0].map(|y| Point2::new(60.0, y)).to_vec();
+        let corrected = correct_outline(&image, &bbox, &drawn, &[OutlineStroke { points, is_inside: true }]);
+        assert!(corrected.contains(&missing) && corrected.contains(&corner), "{corrected:?}");
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub enum Violation {
     },
     /// The hand leaves the workspace.
     #[error(
-        "at {time_secs:.3} s the {part} is at {axis} = {found_m:.3} m, outside the workspace of {min_m:.3} to {max_m:.3} m"
+        "at {time_secs:.3} s the {part} is at {axis} = {found_m:.4} m, outside the workspace of {min_m:.4} to {max_m:.4} m"
     )]
     Workspace {
         time_secs: f64,
@@ -62,7 +62,7 @@ pub enum Violation {
         max_m: f64,
     },
     /// Finger tips, hand, wrist or elbow come too close to the table.
-    #[error("at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are required")]
+    #[error("at {time_secs:.3} s the {part} is {found_mm:.1} mm above the table, at least {min_mm:.1} mm are required")]
     Table {
         time_secs: f64,
         /// Finger tips, hand, wrist or elbow.

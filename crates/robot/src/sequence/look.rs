@@ -139,8 +139,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 self.cell.camera.base_from_tcp(self.robot.geometry(), &base_from_camera)
             })
             .collect();
-        let unreachable =
-            |why: String| Stop::Failed(step, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"));
+        let unreachable = |why: String| {
+            let why = format!("the camera cannot be moved above the part at ({:.2}, {:.2}) m: {why}", grasp.x, grasp.y);
+            Stop::Failed(step, why)
+        };
         if self.is_surrounded() {
             let way = self.way_to(&Destination::Poses(&poses));
             let way =
