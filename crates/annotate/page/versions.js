@@ -51,16 +51,27 @@ function isWorse({ figures: now }, { figures: before }) {
   return share(before) - share(now) > MIN_DROP - 1e-9 || isNew(({ wrong }) => wrong) || isNew(({ false_alarms: [count] }) => count);
 }
 
-/** A warning, in both steps that show a new model, if it is worse than the one before it. */
+/** A warning of marked photos whose grasp points in another direction than that of the first one. */
+function turnedText({ figures }) {
+  const turned = figures?.turned_photos ?? [];
+  if (!turned.length) return "";
+  const photos = turned.length === 1 ? `marked photo ${turned[0]}` : `marked photos ${turned.join(", ")}`;
+  return `The grasp in ${photos} points in another direction than that in photo 1, so the model turns the hand at random. “Swap ends” turns a grasp; a part that looks the same in both directions needs its symmetry. `;
+}
+
+/** Warnings, in both steps that show a new model: it is worse than the one before it, or its photos contradict each other. */
 function renderWorse() {
-  const [before, now] = state.models.slice(-2);
-  const isShown = Boolean(now) && now.is_current && !isRunning() && isWorse(now.summary, before.summary);
-  const text = isShown ? `${number(now.id)} is worse on new samples than ${number(before.id)}: ${briefFigures(now.summary)}, before: ${briefFigures(before.summary)}. ` : "";
+  const now = state.models.at(-1);
+  const before = state.models.at(-2);
+  const isShown = Boolean(now) && now.is_current && !isRunning();
+  const isLess = isShown && Boolean(before) && isWorse(now.summary, before.summary);
+  const worse = isLess ? `${number(now.id)} is worse on new samples than ${number(before.id)}: ${briefFigures(now.summary)}, before: ${briefFigures(before.summary)}. ` : "";
+  const text = isShown ? turnedText(now.summary) + worse : "";
   for (const place of document.querySelectorAll(".worse")) {
-    place.hidden = !isShown;
+    place.hidden = !text;
     if (place.dataset.shown === text) continue;
     place.dataset.shown = text;
-    place.replaceChildren(text, ...(isShown ? [button(`Use ${number(before.id)} again`, () => use(before.id))] : []));
+    place.replaceChildren(text, ...(isLess ? [button(`Use ${number(before.id)} again`, () => use(before.id))] : []));
   }
 }
 

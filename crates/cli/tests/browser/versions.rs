@@ -67,21 +67,22 @@ fn a_hand_turned_by_half_a_turn_is_a_change() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
-fn a_version_that_is_clearly_worse_is_warned_of() {
+fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
     let page = taught();
     // The results of a second version are made up, after the page has asked for the versions.
     let worse = "return new Promise((done) => setTimeout(done, 500)).then(() => import('/page/store.js')).then(({ state, changed }) => {
         const [model] = state.models;
         Object.assign(model.summary.figures, { found: [19, 19], wrong: 0, false_alarms: [0, 5] });
         const worse = structuredClone({ ...model, id: 1 });
-        Object.assign(worse.summary.figures, { found: [14, 19], wrong: 5, false_alarms: [1, 5] });
+        Object.assign(worse.summary.figures, { found: [14, 19], wrong: 5, false_alarms: [1, 5], turned_photos: [2] });
         state.models = [{ ...model, is_current: false }, worse];
         changed();
     })";
     page.browser.run(worse, &[]).unwrap();
     page.wait_for("the warning", "return !document.querySelector('#panel-try .worse').hidden");
     let told = page.text("#panel-try .worse");
-    assert!(told.starts_with("Model 2 is worse on new samples than Model 1: 14 of 19 found, 5 wrong"), "{told}");
+    assert!(told.starts_with("The grasp in marked photo 2 points in another direction than that in photo 1"), "{told}");
+    assert!(told.contains("Model 2 is worse on new samples than Model 1: 14 of 19 found, 5 wrong"), "{told}");
     page.screenshot("versions-3-worse");
     page.assert_accessible("a worse version");
     page.click("#panel-try .worse button");
