@@ -42,7 +42,8 @@ const FILM_SPEED: f64 = 2.0;
 
 /// The page of `sdg rehearse`.
 pub fn rehearsal(page: &RunPage) -> Result<Report> {
-    let title = format!("{}: {} grasp attempts", page.object.title, page.rehearsed.attempts.len());
+    let action = if page.rehearsed.is_placing { "grasp and place" } else { "grasp" };
+    let title = format!("{}: {} {action} attempts", page.object.title, page.rehearsed.attempts.len());
     let report = Report::new(title).kicker("Rehearsal in simulation").lead(format!(
         "A grasp model taught from one photo searched for the {} on the table, {}.",
         page.object.title.to_lowercase(),
@@ -87,10 +88,10 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
 
 /// The results of the attempts, as the end of a sentence.
 fn lifted(page: &RunPage) -> String {
+    let did = if page.rehearsed.is_placing { "put it down in its place" } else { "lifted it" };
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
-        (0, of) => format!("and lifted it in none of {of} attempts"),
-        (successes, of) if successes == of => format!("and lifted it in {of} of {of} attempts"),
-        (successes, of) => format!("and lifted it in {successes} of {of} attempts"),
+        (0, of) => format!("and {did} in none of {of} attempts"),
+        (successes, of) => format!("and {did} in {successes} of {of} attempts"),
     }
 }
 
@@ -98,9 +99,9 @@ fn with_key_figures(report: Report, page: &RunPage) -> Report {
     let attempts = &page.rehearsed.attempts;
     let successes = page.rehearsed.successes();
     let tone = if successes * 10 >= attempts.len() * 9 { Tone::Good } else { Tone::Warning };
-    let report = report.key_figure(
-        KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), "grasped and held").tone(tone),
-    );
+    let what = if page.rehearsed.is_placing { "grasped and put down" } else { "grasped and held" };
+    let report =
+        report.key_figure(KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), what).tone(tone));
     match median(attempts.iter().filter_map(|a| a.detection_error.map(|e| e.distance_mm))) {
         Some(mm) => report.key_figure(KeyFigure::new(format!("{mm:.1}"), "mm", "median error at closing")),
         None => report,
@@ -117,12 +118,15 @@ fn with_film(report: Report, page: &RunPage) -> Result<Report> {
         ..AnimationOptions::default()
     };
     let film = Animation::encode(&page.rehearsed.film, &options)?;
-    Ok(report.cover(Figure::animation(film).alt("The robot's attempt, seen from beside the table.").caption(
-        match page.rehearsed.successes() {
-            0 => "An attempt that failed, at twice its speed.",
-            _ => "One attempt, at twice its speed: look, hover, approach, close, lift, hold.",
-        },
-    )))
+    let caption = match (page.rehearsed.successes(), page.rehearsed.is_placing) {
+        (0, _) => "An attempt that failed, at twice its speed.",
+        (_, false) => "One attempt, at twice its speed: look, hover, approach, close, lift, hold.",
+        (_, true) => {
+            "One attempt, at twice its speed: look, hover, approach, close, lift, hold, carry, put down, release."
+        }
+    };
+    let film = Figure::animation(film).alt("The robot's attempt, seen from beside the table.").caption(caption);
+    Ok(report.cover(film))
 }
 
 fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
@@ -156,13 +160,16 @@ fn attempts(page: &RunPage) -> Section {
         true => GraspStep::WITH_PLACING.map(GraspStep::name).to_vec(),
         false => GraspStep::ALL.map(GraspStep::name).to_vec(),
     };
+    let (done, meaning) = match page.rehearsed.is_placing {
+        true => ("placed", "in its place in the last picture"),
+        false => ("held", "at least 10 cm above the table between both fingers, one second after lifting"),
+    };
     Section::new("Attempts")
-        .lead(
-            "Random poses of the part, robot starts, light, tables and other objects. Held means: at least 10 cm \
-             above the table between both fingers, one second after lifting.",
-        )
-        .matrix(outcome_matrix(&steps, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
-        .table(attempts_table(&steps, &page.rehearsed.attempts).caption(
+        .lead(format!(
+            "Random poses of the part, robot starts, light, tables and other objects. A part is {done} if it is {meaning}."
+        ))
+        .matrix(outcome_matrix(&steps, done, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
+        .table(attempts_table(&steps, done, &page.rehearsed.attempts).caption(
             "The part's position is in the robot's base frame. Errors are those of the second detection, from above \
              the part.",
         ))

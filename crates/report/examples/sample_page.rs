@@ -44,7 +44,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         .section(
             Section::new("Attempts")
                 .lead("Random poses and start configurations. Held means: at least 10 cm above the table between both fingers, one second after lifting.")
-                .matrix(outcome_matrix(&STEPS, &attempts, 10.0, 10.0))
+                .matrix(outcome_matrix(&STEPS, "held", &attempts, 10.0, 10.0))
                 .shares(
                     ShareChart::new("Attempts that held the part")
                         .reference_name("the paper")
@@ -52,7 +52,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
                         .row("B", 97.5, [91.3, 99.3], Some(82.5))
                         .row("S", 78.8, [68.6, 86.3], None),
                 )
-                .table(attempts_table(&STEPS, &attempts).caption(
+                .table(attempts_table(&STEPS, "held", &attempts).caption(
                     "The part's position is in the robot's base frame. Errors are those of the second detection, from \
                      above the part.",
                 )),

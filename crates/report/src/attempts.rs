@@ -35,11 +35,12 @@ pub struct AttemptSummary {
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians at the bottom if there are several; `steps` are the names of the steps in order.
+/// The table of attempts, with medians at the bottom if there are several; `steps` are the names of the steps in order,
+/// `done` is the outcome of a successful attempt ("held").
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
-pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
+pub fn attempts_table(steps: &[&str], done: &str, attempts: &[AttemptSummary]) -> Table {
     let mut table = Table::new(vec![
         Column::number("#"),
         Column::text("outcome"),
@@ -52,7 +53,7 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
         Column::number("time").unit("s"),
     ]);
     for attempt in attempts {
-        let verdict = if attempt.success { (Tone::Good, "held") } else { (Tone::Bad, "failed") };
+        let verdict = if attempt.success { (Tone::Good, done) } else { (Tone::Bad, "failed") };
         let why = attempt.why.trim();
         let error = |pick: fn(&DetectionError) -> f64| {
             attempt.detection_error.as_ref().map_or(Cell::missing(), |error| Cell::number(pick(error), 1))
@@ -80,14 +81,14 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
     if attempts.len() < 2 {
         return table;
     }
-    let held = attempts.iter().filter(|attempt| attempt.success).count();
+    let num_done = attempts.iter().filter(|attempt| attempt.success).count();
     let errors = |pick: fn(&DetectionError) -> f64| {
         let values = attempts.iter().filter_map(|attempt| attempt.detection_error.as_ref().map(pick));
         median(values).map_or(Cell::missing(), |value| Cell::number(value, 1))
     };
     table.summary(vec![
         Cell::text(""),
-        Cell::text(format!("{held} of {} held", attempts.len())),
+        Cell::text(format!("{num_done} of {} {done}", attempts.len())),
         Cell::text(""),
         Cell::text(""),
         Cell::text(""),
@@ -99,11 +100,17 @@ pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
 }
 
 /// Detections and outcomes: the rows are classes of the last detection's error, the columns are the steps (of `steps`)
-/// at which attempts failed, and "held".
+/// at which attempts failed, and `done`, the outcome of a successful attempt.
 ///
 /// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]
-pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64, right_deg: f64) -> Matrix {
+pub fn outcome_matrix(
+    steps: &[&str],
+    done: &str,
+    attempts: &[AttemptSummary],
+    right_mm: f64,
+    right_deg: f64,
+) -> Matrix {
     let seen = |attempt: &AttemptSummary| match attempt.detection_error {
         Some(error) if error.distance_mm <= right_mm && error.angle_deg <= right_deg => 0,
         Some(_) => 1,
@@ -114,7 +121,7 @@ pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64
         let ended = if attempt.success { steps.len() } else { attempt.step };
         counts[seen(attempt)][ended] += 1;
     }
-    let columns = steps.iter().copied().chain(["held"]);
+    let columns = steps.iter().copied().chain([done]);
     let labels = ["correct".to_owned(), "wrong".to_owned(), "not detected".to_owned()];
     let matrix = Matrix::new("Last detection, and step at which the attempt ended", columns).good_column(steps.len());
     labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
@@ -151,6 +158,7 @@ mod tests {
         };
         let html = outcome_matrix(
             &STEPS,
+            "held",
             &[attempt(1, 5, true, ""), attempt(2, 4, false, "slipped"), attempt(3, 0, false, "nothing found"), beside],
             10.0,
             10.0,
@@ -164,6 +172,7 @@ mod tests {
     fn the_table_tells_what_happened() {
         let html = attempts_table(
             &STEPS,
+            "held",
             &[attempt(1, 5, true, ""), attempt(2, 4, false, "slipped <out>"), attempt(3, 0, false, "nothing found")],
         )
         .to_html();
@@ -177,6 +186,6 @@ mod tests {
 
     #[test]
     fn a_table_of_nothing_is_well_formed() {
-        assert_well_formed(&attempts_table(&STEPS, &[]).to_html());
+        assert_well_formed(&attempts_table(&STEPS, "held", &[]).to_html());
     }
 }
