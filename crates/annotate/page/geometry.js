@@ -171,10 +171,14 @@ export function placedAt(point, part, { length: jawLength = null, before = null 
   };
   TURNS.forEach(tryAngle);
   if (!best) return { center: point, angle: before ?? 0, length, width: length };
-  const coarse = best.angle;
-  FINE_TURNS.forEach((turn) => tryAngle(coarse + turn));
   const middled = (angle, middle) => add(point, times(quarter(direction(angle)), middle));
-  const along = alongSides({ center: middled(best.angle, best.middle), angle: best.angle, width: best.width }, part);
+  const coarse = best.angle;
+  let along = alongSides({ center: middled(coarse, best.middle), angle: coarse, width: best.width }, part);
+  if (along === coarse) {
+    // Without straight sides, the angle of the smallest width.
+    FINE_TURNS.forEach((turn) => tryAngle(coarse + turn));
+    along = best.angle;
+  }
   const angle = before !== null && Math.cos(along - before) < 0 ? along + Math.PI : along;
   const { least, most } = reach({ center: point, angle, length }, part) ?? { least: -best.width / 2, most: best.width / 2 };
   return { center: middled(angle, (least + most) / 2), angle, length, width: withRoom(most - least) };
