@@ -211,8 +211,8 @@ fn fit_constant(
     })
 }
 
-/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts; the
-/// latter are the ones to adopt.
+/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts. The
+/// weights fitted on all parts are the ones to adopt.
 fn report_score(observed: &Observed) -> ScoreReport {
     let today = ScoreConfig::DEFAULT;
     let fitted = fit_score(&observed.training, &today);
