@@ -81,7 +81,8 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
+/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the
+/// progress.
 ///
 /// # Errors
 /// A name that belongs to no constant, fewer than two parts in either half, and a part that cannot be taught.

@@ -32,7 +32,8 @@ const MIN_INSIDE: f32 = 0.3;
 /// Used as the largest log-odds of a cell if no cell counts.
 const NO_CELL: f32 = -20.0;
 const NUM_OUTPUTS: usize = 64;
-/// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, the mean probability of the cells.
+/// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, and the mean probability of the
+/// cells.
 const NUM_POOLED: usize = 2 * NUM_OUTPUTS + 2;
 const NUM_HIDDEN: usize = 64;
 
