@@ -38,8 +38,8 @@ pub(crate) struct Shot {
     pub(crate) below_camera: Point2<f64>,
 }
 
-/// Assumed focal length of a camera, in widths of the picture: a field of view of 49°, as in a telephone. Chosen by
-/// hand.
+/// Assumed focal length of a camera, in lengths of the picture's longer side: a field of view of 49°, as in a
+/// telephone. Chosen by hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 
 /// Assumed focal length of the camera that took a picture of this width and height, in pixels.
@@ -182,6 +182,7 @@ impl<'a> SizedDemonstration<'a> {
         view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
     }
 
+    /// The pose of the cut-out in the image.
     fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
         scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
     }
