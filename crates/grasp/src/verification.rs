@@ -176,7 +176,7 @@ const MIN_GAIN_BEYOND_END: f64 = 0.05;
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {
-    /// The pose of the resized cut-out in the halved picture, and back.
+    /// The pose of the resized cut-out in the halved picture.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let view_from_image = scaling(1.0 / self.working.shrink());
         view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
