@@ -124,6 +124,7 @@ impl CloseUp {
     fn share_without_rim(&self, fits: &[f32], is_seen: &[Option<[f32; 3]>]) -> f64 {
         /// Half a cell on both sides of the outline.
         const AT_OUTLINE: f32 = 1.5;
+        /// A window with a smaller correlation has hardly any.
         const HARDLY: f32 = 0.25;
         let at_outline = |i: &usize| self.cell_depth[*i].abs() < AT_OUTLINE && is_seen[*i].is_some();
         let (mut without, mut all) = (0, 0);
@@ -183,6 +184,7 @@ impl CloseUp {
         const LARGE: f32 = 8.0;
         /// Keeps the contrast of a plain part from being amplified.
         const PLAIN: f32 = 50.0;
+        /// Limits of the factor on a channel's contrast.
         const CONTRASTS: (f32, f32) = (0.3, 2.5);
         let pairs: Vec<Pair> = (0..seen.len())
             .filter(|&i| self.cell_depth[i] > INSIDE)
