@@ -8,14 +8,15 @@
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
-/// Penalty of the mean cosine per squared cell of shift; the penalty per squared radian of rotation and per squared ln
-/// of size is twenty times this one. Of 0, 0.005, 0.02, 0.04 and 0.08, the value 0.04 gave the smallest errors for 192
-/// poses of 24 generated parts with errors of up to a tenth of the part, 8° and 6 %: a median of 2.9 % of the part, and
-/// 8.0 % before the correction.
+/// Penalty of the mean cosine per squared cell of shift. Of 0, 0.005, 0.02, 0.04 and 0.08, the value 0.04 gave the
+/// smallest errors for 192 poses of 24 generated parts with errors of up to a tenth of the part, 8° and 6 %: a median
+/// of 2.9 % of the part, and 8.0 % before the correction.
 const SHIFT_PENALTY: f64 = 0.04;
+/// Penalty per squared radian of rotation and per squared ln of size: twenty times [`SHIFT_PENALTY`].
 const TURN_PENALTY: f64 = 0.8;
-/// Step of rotation (radians), and of ln of size, that corresponds to a step of one cell.
+/// Step of rotation, in radians, that corresponds to a step of one cell.
 const TURN_STEP: f64 = 0.1;
+/// Step of ln of size that corresponds to a step of one cell.
 const SIZE_STEP: f64 = 0.06;
 /// Minimum fraction of a cell inside the outline for the cell to be used.
 const MIN_INSIDE: f32 = 0.05;

@@ -142,7 +142,7 @@ pub struct ScoreConfig {
     pub added: Term,
     /// Term of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Term of ln of the likelihood ratio of the network's score: on the part over elsewhere.
+    /// Term of ln of the likelihood of the network's score on the part over its likelihood elsewhere.
     pub network: Term,
 }
 
@@ -227,8 +227,8 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 }
 
 /// Term of the squared ln of a size over the demonstration's size. A refined pose has a size error of about 2.5 % if a
-/// slanted view shows a part's walls; the weight is half of the inverse square of that error, to 10 %. Chosen by hand
-/// from six rendered pictures.
+/// slanted view shows a part's walls. The weight is half of the inverse square of that error; differences above 10 %
+/// count as 10 %. Chosen by hand from six rendered pictures.
 const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {

@@ -1,6 +1,6 @@
 //! Numbers that JSON restores exactly.
 //!
-//! `serde_json` reads a number exactly when it has at most 15 digits or so; longer ones may change by one unit in the
+//! `serde_json` reads a number exactly if it has at most about 15 digits; longer ones may change by one unit in the
 //! last place, and a model read from its file would give slightly different scores than the written model.
 
 /// Rounded to nine decimals. Exact in JSON below about nine million; values that are not finite are unchanged.

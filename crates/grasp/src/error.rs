@@ -55,7 +55,7 @@ pub enum GraspError {
     /// A region that cannot be searched.
     #[error(transparent)]
     Region(#[from] crate::region::RegionError),
-    /// A grasp whose ray misses the grasp plane.
+    /// A grasp whose ray misses the marks' plane.
     #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at a height of {height_m} m")]
     OffPlane {
         x: f64,

@@ -18,7 +18,7 @@ const MAX_OFF_PX: f64 = 0.5;
 
 impl GraspModel {
     /// The part's size in the picture relative to that in the photo. If the numbers of pixels differ, relative to the
-    /// nearest of the sizes that are then possible. `None` without verification, and in a plan view.
+    /// nearest possible nominal size. `None` without verification, and in a plan view.
     pub fn size_of(&self, detection: &GraspDetection, [width, height]: [u32; 2]) -> Option<f64> {
         let (demonstration_idx, pose) = self.pose_of(detection)?;
         let demonstration = &self.demonstrations[demonstration_idx];

@@ -27,7 +27,8 @@ use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot, search};
 
-/// Minimum length of the shorter side of an image. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
+/// Minimum length of the shorter side of an image. Chosen by hand, not measured: a level of the pyramid has at least 24
+/// pixels per side.
 const MIN_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.

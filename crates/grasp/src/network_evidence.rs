@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::network_calibration::{NetworkCalibration, log_odds};
 
-/// A score this far below the threshold, in log-odds, does not speak against the part: pictures score lower than
-/// held-out samples by about this much (the correct places of the housing had a median score of 3.7 in pictures and 5.5
-/// in held-out samples; docs/decisions/013-base-weights.md).
+/// A score at most this far below the threshold, in log-odds, does not speak against the part: pictures score lower
+/// than held-out samples by about this much (the correct places of the housing had a median score of 3.7 in pictures
+/// and 5.5 in held-out samples; docs/decisions/013-base-weights.md).
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
@@ -53,7 +53,7 @@ impl NetworkEvidence {
         }
     }
 
-    /// ln of the likelihood ratio of such a score: on the part over elsewhere. Every count is increased by one.
+    /// ln of the likelihood of such a score on the part over its likelihood elsewhere. Every count is increased by one.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);

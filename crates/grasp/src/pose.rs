@@ -26,7 +26,7 @@ pub struct GraspPose {
 }
 
 impl GraspPose {
-    /// Projects the grasp through the pinhole camera onto the grasp plane.
+    /// Projects the grasp through the pinhole camera onto the marks' plane; the pose is at the grasp height.
     ///
     /// # Units and frames
     /// `grasp` in pixels of `camera`, whose world is the robot's base; `max_opening_m` is the gripper's stroke.

@@ -94,13 +94,13 @@ mod tests {
 
     #[test]
     fn another_number_of_pixels_is_another_size_or_another_crop() {
-        // 1.05 times the number of pixels: from 0.75 to 1.05 · 1.35 in one search.
+        // 1.05 times the pixels per side: from 0.75 to 1.05 · 1.35 in one search.
         let [range] = &SizeRange::all(Some([640, 480]), [672, 504], &TOLERANCE)[..] else { panic!("one range") };
         assert!((range.scales.start() - 0.75).abs() < 1e-12 && (range.scales.end() - 1.4175).abs() < 1e-12);
         assert!(range.log_size(1.0) == 0.0 && range.log_size(1.05) == 0.0);
         assert!((range.log_size(1.155) - 1.1f64.ln()).abs() < 1e-12);
 
-        // 1.5 times the number of pixels, and a third: too far for one search.
+        // 1.5 times the pixels per side, and a third: too far for one search.
         assert_eq!(SizeRange::all(Some([640, 480]), [960, 720], &TOLERANCE).len(), 2);
         let [pixels, frame] = &SizeRange::all(Some([960, 720]), [320, 240], &TOLERANCE)[..] else {
             panic!("two ranges")

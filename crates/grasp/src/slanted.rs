@@ -29,8 +29,9 @@ const MIN_TILT: f64 = 0.24;
 /// Minimum decrease of the cost by a slant, relative to a level camera: less is noise of the fits. Chosen by hand to
 /// save time; the agreement of the places decides.
 const MIN_EXPLAINED: f64 = 0.1;
-/// Minimum gain of agreement over the level view, of a slanted place and then of the picture. For places seen by a
-/// camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned sets).
+/// Minimum gain of agreement over the level view: first of the best place, then of the sum over accepted detections.
+/// For places seen by a camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned
+/// sets).
 const SLANT_GAIN: f64 = 0.03;
 /// Minimum score in the rectified picture if nothing is accepted in the picture itself: a slant can also make another
 /// part, mainly a longer one, similar to the photo. Without this minimum, three more of the tuned sets' pictures

@@ -32,7 +32,7 @@ impl TaughtMarks {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
     }
 
-    /// The marks on the cut-out enlarged by `factor`.
+    /// The marks on the cut-out resized by `factor`.
     pub(crate) fn resized(&self, factor: f64) -> Self {
         let resize = scaling(factor);
         let BoundingBox { x1, y1, x2, y2 } = self.bbox;

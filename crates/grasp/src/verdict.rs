@@ -128,14 +128,14 @@ pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// ln of the likelihood ratio of the network's score: on the part over elsewhere; `None` if the network was not
-    /// evaluated.
+    /// ln of the likelihood of the network's score on the part over its likelihood elsewhere; `None` if the network was
+    /// not evaluated.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,
 }
 
-/// Minimum fraction of the photo's edges in which photo and rival must differ.
+/// Minimum [`RivalFit::share`]; below it, the rival does not count.
 const MIN_RIVALS_SHARE: f64 = 0.03;
 
 /// Minimum score of the size reference. Chosen by hand, not measured.

@@ -38,8 +38,8 @@ pub(crate) struct Shot {
     pub(crate) below_camera: Point2<f64>,
 }
 
-/// Assumed focal length of a camera, in widths of the picture: a field of view of 49°, as in a telephone. Chosen by
-/// hand.
+/// Assumed focal length of a camera, in lengths of the picture's longer side: a field of view of 49°, as in a
+/// telephone. Chosen by hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 
 /// Assumed focal length of the camera that took a picture of this width and height, in pixels.
@@ -176,12 +176,13 @@ const MIN_GAIN_BEYOND_END: f64 = 0.05;
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {
-    /// The pose of the resized cut-out in the halved picture, and back.
+    /// The pose of the resized cut-out in the halved picture.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let view_from_image = scaling(1.0 / self.working.shrink());
         view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
     }
 
+    /// The pose of the cut-out in the image.
     fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
         scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
     }

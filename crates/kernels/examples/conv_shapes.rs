@@ -1,5 +1,5 @@
-//! Times of an R50-FPN backbone at 480×640: each convolution alone, forwards, with packed weights. Left out are the
-//! FPN's convolutions at p4 and p5.
+//! Times of an R50-FPN backbone at 480×640: each convolution alone, forwards, with packed weights. The FPN's
+//! convolutions at p4 and p5 are left out.
 //!
 //! `cargo run --release -p sdg-kernels --example conv_shapes`
 

@@ -32,7 +32,7 @@
 //! let params = Conv2dParams { stride: [1, 1], padding: [1, 1] };
 //! let blurred = conv2d(image, box_blur, None, params);
 //! assert_eq!(blurred.dims(), [1, 1, 4, 4]);
-//! // A corner sees four of the nine pixels of its window.
+//! // Four of the nine pixels of a corner's window are inside.
 //! let corner: f32 = blurred.slice([0..1, 0..1, 0..1, 0..1]).into_scalar();
 //! assert!((corner - 4.0 / 9.0).abs() < 1e-6);
 //!

@@ -151,7 +151,7 @@ fn free_spot(rng: &mut Pcg64Mcg, part: &PlanarSimilarity) -> PlanarSimilarity {
     }
 }
 
-/// Wrong by up to 12 px, 12 degrees and 5 % of scale.
+/// The true pose with an error of up to 12 px, 12 degrees and 5 % of scale.
 fn perturbed(truth: &PlanarSimilarity, pivot: &nalgebra::Point2<f64>, rng: &mut Pcg64Mcg) -> PlanarSimilarity {
     let mut target = truth.apply(pivot);
     let (direction, distance) = (rng.random_range(0.0..6.3f64), rng.random_range(0.0..12.0));

@@ -1,10 +1,9 @@
-//! The agreement of the directions of a template's edge points with those of a picture at a pose, computed for several
+//! How well the directions of a template's edge points agree with those of a picture at a pose, computed for several
 //! points at once.
 //!
-//! Legend: with `s` the picture's direction at a point, `d` the point's own, both at twice their angle, and `R` the
-//! rotation by twice the pose's angle, a point's share of the sum is
-//! `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)`; both products are added up over all points, and the
-//! rotation is applied once.
+//! Legend: `s` is the picture's direction at a point and `d` the point's own direction, both at twice their angle; `R`
+//! is the rotation by twice the pose's angle. A point adds `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)` to
+//! the sum. Both products are added up over all points, and the rotation is applied once.
 
 use pulp::{Simd, WithSimd};
 use wide::f32x4;

@@ -42,7 +42,7 @@ impl CaptureRange {
         ]
     }
 
-    /// Mean over the four coordinates of the squared change from the start as a share of its limit, in `[0, 1]`.
+    /// Mean over the four coordinates of `(change from the start / its limit)²`, in `[0, 1]`.
     pub(crate) fn distance(&self, pose: &Pose) -> f64 {
         let difference = self.difference(pose);
         (0..4).filter(|&k| self.limits[k] > 0.0).map(|k| (difference[k] / self.limits[k]).powi(2)).sum::<f64>() / 4.0

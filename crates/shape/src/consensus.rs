@@ -25,9 +25,9 @@ pub(crate) const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
 /// Distance of the starts of the first round from the pose, in level pixels of edge movement by shift and by scale.
 /// Chosen by hand, not measured.
 const START_STEP: f64 = 3.0;
-/// Maximum rounds of gathering crests, and the movement (level pixels) below which they stop. Both limit
-/// the time; chosen by hand, not measured.
+/// Maximum rounds of gathering crests. Chosen by hand to save time, not measured.
 const MAX_ROUNDS: usize = 5;
+/// Movement in level pixels below which the rounds stop. Chosen by hand to save time, not measured.
 const CONVERGED_PX: f64 = 0.01;
 /// Steps that differ by less, in level pixels, are treated as one. Chosen by hand to save time.
 const MERGE_PX: f64 = 0.02;
@@ -54,7 +54,7 @@ pub(crate) fn snap(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &Ca
     snap_from(level, matched, range, from, Starts::Around)
 }
 
-/// As [`snap`], from fewer starts.
+/// As [`snap`], from the starts `first`.
 pub(crate) fn snap_from(
     level: &TemplateLevel,
     matched: &MatchedLevel<'_>,
@@ -251,7 +251,7 @@ where
             let (lower, right) = in_lanes(equations);
             let mut normal_matrix = SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(lower[i][j]));
             let right = SVector::<f64, N>::from_fn(|i, _| f64::from(right[i]));
-            // Directions that no edge constrains (the angle of a ring) are not changed. The share was chosen by hand.
+            // Directions that no edge constrains (the angle of a ring) are not changed. The factor was chosen by hand.
             normal_matrix += SMatrix::<f64, N, N>::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
             for k in 0..N {
                 if !is_free[k] {

@@ -16,9 +16,9 @@ const MIN_COHERENCE: f32 = 0.5;
 /// cos 2φ, with the angle φ between an edge's normal and the outline's, above which the edge is the outline's own: up
 /// to 30°. Chosen by hand, not measured.
 const OUTLINE_ALIGNMENT: f64 = 0.5;
-/// Rounds of the re-weighting that balances the directions of the pose, and its smallest and largest factor. Chosen by
-/// hand, not measured.
+/// Rounds of the re-weighting that balances the directions of the pose. Chosen by hand, not measured.
 const BALANCE_ROUNDS: usize = 3;
+/// Smallest and largest factor of that re-weighting. Chosen by hand, not measured.
 const BALANCE_LIMITS: (f64, f64) = (0.4, 4.0);
 
 /// One edge point of the demonstration.
@@ -103,7 +103,7 @@ fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelec
             let inside = selection.outline.contains(&position);
             let on_outline = outline_normal_near(selection.outline, &position, margin_px)
                 .is_some_and(|outline_normal| 2.0 * normal.dot(&outline_normal).powi(2) - 1.0 > OUTLINE_ALIGNMENT);
-            // Just outside the outline, only the part's own edge belongs to it.
+            // Just outside the outline, only edges in the outline's direction belong to the part.
             if inside || on_outline {
                 candidates.push(EdgeCandidate { position, normal, strength, on_outline });
             }

@@ -106,7 +106,7 @@ mod tests {
     fn plate(angle_deg: f64, middle: Point2<f64>) -> RgbImage {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         RgbImage::from_fn(240, 200, |x, y| {
-            // Four samples a side smooth the edges, as a lens does.
+            // 4 × 4 samples per pixel smooth the edges, as a lens does.
             let mut sum = 0.0;
             for k in 0..16 {
                 let (right, down) = (f64::from(k % 4) / 4.0 + 0.125, f64::from(k / 4) / 4.0 + 0.125);

@@ -49,8 +49,8 @@ struct Affine {
 }
 
 impl ShapeTemplate {
-    /// The shortening of the part near this pose; `None` for an impossible pose, or if the part is shortened more than
-    /// at the maximum tilt.
+    /// The shortening of the part near `start`; `None` for an impossible pose, or if the part is shortened more than at
+    /// the maximum tilt.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.

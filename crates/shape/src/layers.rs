@@ -65,9 +65,10 @@ fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32
     }
 }
 
-/// Pixels of a row, and output channels, that are summed together: the sums stay in registers, and a weight is read once
-/// for all these pixels. Chosen for time.
+/// Pixels of a row that are summed together: the sums stay in registers, and a weight is read once for all these
+/// pixels. Chosen for time.
 const PIXELS: usize = 4;
+/// Output channels that are summed together. Chosen for time.
 const CHANNELS: usize = 16;
 
 /// One convolution and its rectifier. Every sum has the order of its definition: tap by tap, input by input.

@@ -15,12 +15,13 @@ use crate::gradient_field::GradientField;
 use crate::revolution::Revolution;
 use crate::template::ShapeTemplate;
 
-/// Number of shifts along the axis in each direction at which the profile is compared with the picture, and their step
-/// in part lengths. Together they exceed a thread's pitch.
+/// Number of shifts along the axis in each direction at which the profile is compared with the picture.
 const NUM_SHIFTS: i32 = 4;
+/// Step of these shifts, in part lengths; the largest shift exceeds a thread's pitch.
 const SHIFT: f64 = 0.03;
-/// Largest movement of a pose from its shifted start, and minimum gain of agreement.
+/// Largest movement of a pose from its shifted start.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
+/// Minimum gain of the profile's agreement, and largest loss of the agreement of all edges.
 const MIN_GAIN: f64 = 0.05;
 /// Number of steps into which a shift is divided. Chosen by hand: the largest shifts are of nine pixels.
 const SHARES: usize = 8;

@@ -7,25 +7,29 @@ use image::RgbImage;
 use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Mask, Polygon};
 
-/// Minimum share of the part covered by its mirror image, minimum length over mean width, and minimum share of the
-/// light's variance that is explained by the position across the axis. Seven rendered parts of revolution and a
-/// photographed screw have at least 0.92 (a deep thread with one start, whose sides differ), 3.4 and 0.39; flat parts
-/// that are as symmetric and as slender have at most 0.19 of the last.
+/// Minimum share of the part covered by its mirror image. Seven rendered parts of revolution and a photographed screw
+/// have at least 0.92 (a deep thread with one start, whose sides differ).
 const MIN_SYMMETRY: f64 = 0.85;
+/// Minimum length over mean width; those parts have at least 3.4.
 const MIN_SLENDERNESS: f64 = 2.5;
+/// Minimum share of the light's variance that is explained by the position across the axis. Those parts have at least
+/// 0.39; flat parts that are as symmetric and as slender have at most 0.19.
 const MIN_EXPLAINED: f64 = 0.28;
 /// Minimum change of the light across the axis, as a standard deviation over the mean. Chosen by hand.
 const MIN_CHANGE: f64 = 0.06;
-/// Search range of the axis about the main axis of the outline: number of steps in each direction, and step in degrees
-/// or in shares of the greatest width. Chosen by hand.
+/// Search range of the axis's angle about the main axis of the outline: number of steps in each direction, and step in
+/// degrees. Chosen by hand.
 const TURNS: (i32, f64) = (12, 0.5);
+/// Search range of the axis's offset: number of steps in each direction, and step in shares of the greatest width.
+/// Chosen by hand.
 const OFFSETS: (i32, f64) = (6, 0.005);
 /// Number of pixels used to find the axis. Chosen to save time.
 const AXIS_PIXELS: usize = 1000;
-/// Number of sections along the axis and across it in which the light is averaged, and the share of the radius that is
-/// used: pixels nearest to the outline show the background.
+/// Number of sections along the axis in which the light is averaged.
 const ALONG: usize = 40;
+/// Number of sections across the axis in which the light is averaged.
 const ACROSS: usize = 8;
+/// Share of the radius that is used: pixels nearest to the outline show the background.
 const INNER: f64 = 0.8;
 /// A point further from the axis, in mean radii, belongs to a wing: heads and hexagons of the parts above reach up to
 /// 1.9, the wings of a wing bolt 2.9.

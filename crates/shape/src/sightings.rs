@@ -10,9 +10,9 @@ use crate::edge_points::parabola_peak;
 use crate::gradient_field::GradientLevel;
 use crate::lanes::{LANES, in_lanes};
 
-/// Search distance of an edge point along its normal, in level pixels: first and later rounds. Chosen by hand, not
-/// measured.
+/// Search distance of an edge point along its normal in the first round, in level pixels. Chosen by hand, not measured.
 pub(crate) const FIRST_REACH: usize = 6;
+/// The same in later rounds.
 pub(crate) const LATER_REACH: usize = 3;
 /// Maximum number of crests per point. Chosen by hand, not measured.
 pub(crate) const MAX_CRESTS: usize = 3;

@@ -37,8 +37,8 @@ const MIN_IN_CELL: usize = 4;
 const EDGE_MARGIN_PX: f64 = 2.0;
 /// Minimum grey value of a colour with a hue. Chosen by hand, not measured.
 const DARK: f64 = 3.0;
-/// Largest desaturation by highlights and largest saturation by shadow, as a share of the taught value. Chosen by hand,
-/// not measured.
+/// Range of the saturation, as a multiple of the taught saturation, that highlights and shadows may cause. Chosen by
+/// hand, not measured.
 const STRENGTHS: (f64, f64) = (0.6, 1.4);
 /// Minimum share of the points inside the image. Chosen by hand, not measured.
 const MIN_INSIDE: f64 = 0.5;

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use crate::features::Descriptor;
 use crate::{DESCRIPTOR_LENGTH, Features};
 
-/// Numbers of queries and candidates that are compared at a time: their products fill half of the AVX2 registers.
+/// Number of queries that are compared at a time.
 const TILE: usize = 4;
+/// Number of candidates that are compared at a time; the products with the queries fill half of the AVX2 registers.
 const LANES: usize = 16;
 
 /// A feature of one image and the most similar feature of another.

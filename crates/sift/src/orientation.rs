@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_peak_lies_between_its_bins() {
         let mut histogram = [0.0; NUM_BINS];
-        // A parabola with its vertex at bin 0.25, and a lower peak at bin 18 that passes, at 20 that does not.
+        // A peak between bins 0 and 1, and a lower peak at bin 18 that is high enough, at 20 one that is not.
         (histogram[35], histogram[0], histogram[1]) = (0.4375, 0.9375, 0.4375 + 0.5 * 0.9375 - 0.03125);
         histogram[18] = 0.8;
         histogram[20] = 0.7;

@@ -37,8 +37,9 @@ impl Sift {
         &self.config
     }
 
-    /// The features of an image, or of its part inside the mask, from the finest octave to the coarsest and from the
-    /// top down. Descriptors also use pixels outside the mask.
+    /// The features of an image, or of its area inside the mask: from the finest octave to the coarsest and from the
+    /// top down, or strongest contrast first if there are more points than [`SiftConfig::max_features`]. Descriptors
+    /// also use pixels outside the mask.
     ///
     /// The result does not depend on the number of threads or on the processor.
     ///

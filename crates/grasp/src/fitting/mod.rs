@@ -81,7 +81,8 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
+/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the
+/// progress.
 ///
 /// # Errors
 /// A name that belongs to no constant, fewer than two parts in either half, and a part that cannot be taught.
@@ -211,8 +212,8 @@ fn fit_constant(
     })
 }
 
-/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts; the
-/// latter are the ones to adopt.
+/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts. The
+/// weights fitted on all parts are the ones to adopt.
 fn report_score(observed: &Observed) -> ScoreReport {
     let today = ScoreConfig::DEFAULT;
     let fitted = fit_score(&observed.training, &today);

@@ -27,7 +27,7 @@ pub(super) struct Calibrated {
     pub(super) positives: usize,
     /// Number of samples in which a proposal of the network led to a correct pose of the demonstration.
     pub(super) hits: usize,
-    /// The network's scores on the part, found by network or search; 0 without a proposal.
+    /// The network's scores where network or search found the part; 0 without a proposal.
     pub(super) on_part: Vec<f64>,
     /// The network's scores on the place most similar to the part in samples without it; 0 without a proposal.
     pub(super) elsewhere: Vec<f64>,

@@ -32,8 +32,7 @@ pub struct TeachOptions {
     /// Number of detector steps, if it differs from the preset's; the number for the orientation CNN changes in
     /// proportion. For tests and trials.
     pub steps: Option<usize>,
-    /// The fine-tuning; `None` for the preset's training from random values, and for [`FineTuning::new`] from this
-    /// project's base weights.
+    /// The fine-tuning; if `None`, [`FineTuning::new`] for this project's base weights, else the preset's training.
     pub fine_tuning: Option<FineTuning>,
     /// The part's symmetry: its rotations are neither taught nor counted as errors.
     pub symmetry: RotationalSymmetry,

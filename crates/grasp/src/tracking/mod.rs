@@ -77,9 +77,9 @@ impl TrackedPart {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackerConfig {
-    /// Time between the starts of two searches while all known parts are followed, and the maximum time between frames
-    /// that continue each other. If a part is lost or none is known, searches run without a pause. Chosen by hand: a
-    /// new part is found within this time plus that of a search.
+    /// Time between the starts of two searches while all known parts are followed; frames further apart continue each
+    /// other only if they are equal. If a part is lost or none is known, searches run without a pause. Chosen by hand:
+    /// a new part is found within this time plus that of a search.
     pub search_every: Duration,
     /// A track with a lower score is lost. The value is below 0.5, the threshold for detections, because the part was
     /// there in the last frame. Chosen by hand.

@@ -145,8 +145,8 @@ impl Tracker {
     }
 
     /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
-    /// it is the first or was taken long after the last, a followed part is not at its place, or the picture changed
-    /// elsewhere, as far as [`TrackerConfig::moves_within`] allows this to be detected. Its result goes to
+    /// it is the first or was taken long after the last, or a followed part is not at its place or the picture changed
+    /// elsewhere, and this does not count as a movement ([`TrackerConfig::moves_within`]). Its result goes to
     /// [`Self::answer`]. A running search is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;
@@ -284,7 +284,7 @@ impl Tracker {
     /// As for [`crate::GraspModel::detect`].
     pub fn take_outcome(&mut self, outcome: SearchOutcome) -> Result<()> {
         if self.searching != Some(outcome.number) {
-            // The search belongs to a finished sequence.
+            // The search belongs to a finished sequence, or was abandoned.
             return Ok(());
         }
         self.searching = None;

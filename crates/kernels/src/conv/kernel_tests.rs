@@ -120,7 +120,7 @@ fn every_path_agrees_with_plain_loops() {
         // Maps smaller than a panel, channels beyond a tile.
         ([3, 17, 7, 7], [33, 3, 3], [1, 1], [1, 1]),
         ([40, 16, 3, 3], [16, 3, 3], [1, 1], [1, 1]),
-        // Padding larger than the map, so that whole output rows see only zeros.
+        // Padding larger than the map, so that whole output rows depend only on zeros.
         ([1, 2, 2, 2], [3, 3, 3], [1, 1], [4, 5]),
         // Kernels of the heads' transposed convolutions.
         ([2, 5, 14, 14], [8, 4, 4], [2, 2], [1, 1]),

@@ -1,6 +1,6 @@
 //! Convolution 3×3 of stride 1 with a quarter of the multiplications: Winograd's F(4×4, 3×3).
 //!
-//! An output *tile* of 4×4 pixels sees 6×6 input pixels d. With the transforms B, G, A of [`transform`],
+//! An output *tile* of 4×4 pixels depends on 6×6 input pixels d. With the transforms B, G, A of [`transform`],
 //!
 //! `y = Aᵀ [(G g Gᵀ) ⊙ (Bᵀ d B)] A`
 //!

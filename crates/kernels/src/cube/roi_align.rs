@@ -48,7 +48,7 @@ pub(super) fn launched(
 }
 
 /// ROIAlign of one output value. `samples` is the number of samples per bin and axis; 0 for the length of the bin in
-/// feature pixels.
+/// feature pixels, rounded up.
 #[cube(launch)]
 fn roi_align_kernel(
     features: &Tensor<f32>,

@@ -14,7 +14,7 @@ const ALIGNMENTS: [RoiAlignment; 2] = [RoiAlignment::HalfPixel, RoiAlignment::Le
 const RATIOS: [SamplingRatio; 3] = [SamplingRatio::Adaptive, SamplingRatio::Fixed(1), SamplingRatio::Fixed(2)];
 const SHAPE: [usize; 4] = [2, 19, 7, 11];
 
-/// Image pixels are half feature pixels: the maps cover 22 × 14 image pixels.
+/// An image pixel is half a feature pixel wide: the maps cover 22 × 14 image pixels.
 #[rustfmt::skip]
 const ROIS: [f32; 50] = [
     // Inside; a sliver; beyond the lower right and upper left corners; all of the map and more.

@@ -8,18 +8,19 @@ use super::look::CloseLook;
 use super::table::{TableColors, lab, squared};
 use crate::frame::Frame;
 
-/// The longer side of the part, and the side of the frame, in pixels. The surroundings of the part show the table.
+/// Length of the part's longer side in the frame, in pixels.
 const PART_SIDE: f64 = 96.0;
+/// Side of the frame, in pixels; the pixels around the part show its surroundings.
 pub(super) const SIDE: usize = 120;
-/// Cells at least this deep inside the outline show the part; cells at the depths `AROUND`, outside the outline, show
-/// its surroundings.
+/// Minimum depth inside the outline of a cell that shows the part, in pixels of the frame.
 const INSIDE: f32 = 2.5;
+/// Depths of the cells that show the part's surroundings; below 0 outside the outline.
 const AROUND: std::ops::Range<f32> = -12.0..-3.0;
-/// A cell shows the table if its colour lies within `TABLE_SPREADS` of one of the table's colours. Colours of the
-/// picture count as the table's if at least `TABLE_SHARE` of the part's surroundings lie within `AROUND_SPREADS` of
-/// them.
+/// A cell shows the table if its colour lies within this many spreads of one of the table's colours.
 const TABLE_SPREADS: f32 = 2.0;
+/// A cell of the part's surroundings has a colour of the picture if it lies within this many spreads of that colour.
 const AROUND_SPREADS: f32 = 2.5;
+/// A colour of the picture is the table's if at least this share of the part's surroundings has it.
 const TABLE_SHARE: f32 = 0.12;
 /// A cell does not show the part if picture and expected colour differ by more than this: root mean square over the
 /// channels, in units of [`lab`].
@@ -27,7 +28,7 @@ const OTHER_COLOR: f32 = 10.0;
 /// A window counts if the energy of the photo's edges in it exceeds this share of the strongest window's; that energy
 /// is its weight.
 pub(super) const MIN_EDGES: f32 = 0.02;
-/// Windows at most this far outside the outline still show its edge.
+/// Minimum depth of a window that still shows the outline's edge.
 const NEAR: f32 = -6.0;
 
 /// A demonstration prepared for close looks.
@@ -123,6 +124,7 @@ impl CloseUp {
     fn share_without_rim(&self, fits: &[f32], is_seen: &[Option<[f32; 3]>]) -> f64 {
         /// Half a cell on both sides of the outline.
         const AT_OUTLINE: f32 = 1.5;
+        /// A window with a smaller correlation has hardly any.
         const HARDLY: f32 = 0.25;
         let at_outline = |i: &usize| self.cell_depth[*i].abs() < AT_OUTLINE && is_seen[*i].is_some();
         let (mut without, mut all) = (0, 0);
@@ -133,7 +135,7 @@ impl CloseUp {
         f64::from(without as u32) / f64::from(all.max(1) as u32)
     }
 
-    /// Mean energy inside the outline that exceeds the sum of twice the photo's energy and the noise.
+    /// Mean energy inside the outline, less twice the photo's energy and the noise; 0 where that is negative.
     fn added(&self, seen: &Seen) -> f64 {
         const DEEP: f32 = 3.0;
         const NOISE: f32 = 0.1;
@@ -164,7 +166,7 @@ impl CloseUp {
                     .all(|expected| squared(&color, &expected) > 3.0 * OTHER_COLOR * OTHER_COLOR)
             })
             .collect();
-        // Single cells and rows of cells are misplaced edges; only blocks of two by two count.
+        // Single cells and rows of cells are caused by misplaced edges; only blocks of two by two cells count.
         let square = |i: usize| [i, i + 1, i + across, i + across + 1];
         let mut is_area = vec![false; is_bare.len()];
         for i in (0..is_bare.len() - across - 1).filter(|i| square(*i).iter().all(|j| is_bare[*j])) {
@@ -182,6 +184,7 @@ impl CloseUp {
         const LARGE: f32 = 8.0;
         /// Keeps the contrast of a plain part from being amplified.
         const PLAIN: f32 = 50.0;
+        /// Limits of the factor on a channel's contrast.
         const CONTRASTS: (f32, f32) = (0.3, 2.5);
         let pairs: Vec<Pair> = (0..seen.len())
             .filter(|&i| self.cell_depth[i] > INSIDE)

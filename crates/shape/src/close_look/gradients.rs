@@ -21,8 +21,9 @@ const RIM_PX: f32 = 2.5;
 /// Square of the largest shift of a window, in pixels: two along one axis and one along the other.
 const MAX_SHIFT_SQUARED: isize = 5;
 const REACH: usize = 2;
-/// Gradients below this are noise: the first in grey levels per pixel, the second as a share of the root mean square.
+/// Minimum of the noise level, in grey levels per pixel: gradients below the noise level have little weight.
 const NOISE: f32 = 1.5;
+/// The noise level as a share of the gradients' root mean square, if that is more.
 const NOISE_SHARE: f32 = 0.4;
 /// Mean squared length of `v` that is added to every window, so that two empty windows do not correlate.
 const EMPTY: f32 = 0.01;
@@ -33,8 +34,9 @@ const SMOOTHING: [f32; 7] = [0.0148, 0.0833, 0.2351, 0.3336, 0.2351, 0.0833, 0.0
 #[derive(Debug, Clone)]
 pub(super) struct Gradients {
     side: usize,
-    /// x and y: in `signed` of `v`, in `doubled` of `v` at twice its angle.
+    /// x and y of `v`.
     signed: [Vec<f32>; 2],
+    /// x and y of `v` at twice its angle.
     doubled: [Vec<f32>; 2],
     /// Squared lengths, equal for both.
     energy: Vec<f32>,
@@ -97,8 +99,9 @@ impl Gradients {
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
     side: usize,
-    /// x and y of the surface's gradients, and of the outline's edge at twice its angle; 0 elsewhere.
+    /// x and y of the surface's gradients; 0 elsewhere.
     surface: [Vec<f32>; 2],
+    /// x and y of the gradients at the outline's edge, at twice their angle; 0 elsewhere.
     rim: [Vec<f32>; 2],
     /// 1 at pixels of the surface and of the rim that stay inside the frame at every shift, else 0.
     counts: Vec<f32>,
@@ -232,8 +235,8 @@ fn window_means(cells: &[f32], side: usize) -> Vec<f32> {
     (0..cells.len()).map(|i| (above[i] + here[i] + below[i]) / pixels).collect()
 }
 
-/// Brightness from 0 to 255. A pixel outside the picture takes it from the next pixel inside to the left, else to the
-/// right, else above, else below.
+/// Brightness from 0 to 255. A pixel outside the picture gets the brightness of the next pixel inside the picture to
+/// its left, else to its right, else above, else below.
 fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
     let mut brightness: Vec<Option<f32>> =
         colors.iter().map(|color| color.map(|color| 85.0 * color.iter().sum::<f32>())).collect();
@@ -256,7 +259,7 @@ fn filled(colors: &[Option<[f32; 3]>], side: usize) -> Vec<f32> {
     brightness.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// Smoothed along rows, then along columns; beyond the border its pixels are repeated.
+/// Smoothed along rows, then along columns; beyond the border the border's pixels are repeated.
 fn smoothed(values: &[f32], side: usize) -> Vec<f32> {
     in_lanes(Smooth { values, side })
 }

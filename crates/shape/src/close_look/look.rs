@@ -36,6 +36,7 @@ pub struct RivalFit {
     pub margin: f64,
     /// Mean correlation of the rival's edges that the photo lacks.
     pub fit: f64,
-    /// The share of the photo's edges in which rival and photo differ; if it is small, the margin is weak evidence.
+    /// Extent of the differences between rival and photo, over the photo's edges; if it is small, the margin is weak
+    /// evidence.
     pub share: f64,
 }

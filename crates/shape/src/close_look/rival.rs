@@ -21,25 +21,28 @@ use crate::gradient_field::GradientField;
 use crate::parallel;
 use crate::template::ShapeTemplate;
 
-/// Number of angles at which the rival is laid over the photo, number of those poses that are followed to the
-/// agreement's level, and number of the best that are tried in pictures.
+/// Number of angles at which the rival is laid over the photo.
 const NUM_TURNS: usize = 36;
+/// Number of the best of these poses that are followed to the agreement's level.
 const NUM_FOLLOWED: usize = 14;
+/// Number of the best followed poses that are tried in pictures.
 const NUM_STARTS: usize = 4;
-/// Minimum difference between starts, in angle or in position; the latter as a share of the edges' root mean square
-/// distance from the centre.
+/// Minimum difference between starts in angle, if they are nearer than `APART_SHARE` in position.
 const APART_RAD: f64 = 0.2;
+/// Minimum distance between starts, as a share of the edges' root mean square distance from the centre.
 const APART_SHARE: f64 = 0.25;
 /// Largest distance of a refined pose from its start: a picture shows the part in perspective.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
-/// A rotation at which the photo's edges agree with themselves by at least this is tried in pictures. It is compared
-/// closely if its agreement with the picture is lower than that of the original pose by at most the second value.
+/// Minimum agreement of the photo's edges with themselves at a rotation that is tried in pictures.
 const MIN_RESEMBLANCE: f64 = 0.4;
+/// A rotation is compared closely if its agreement with the picture is lower than the original pose's by at most this.
 const MAX_LOSS_BY_TURN: f64 = 0.03;
 /// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// Minimum share of differing edges, and minimum gain, of another rotation that replaces the pose. Chosen by hand.
+/// Minimum extent of the differences from the original pose, as a share of the edges, of a rotation that replaces it.
+/// Chosen by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
+/// Minimum gain of correlation by a rotation that replaces the pose. Chosen by hand.
 const MIN_GAIN_BY_TURN: f64 = 0.1;
 /// A window differs if the edges of the two pictures in it correlate by less than this.
 const SAME: f32 = 0.6;
@@ -176,7 +179,8 @@ impl Rival {
 }
 
 impl CloseUp {
-    /// The share of the photo's edges in which the rival differs when it lies on the photo by `photo_from_own`.
+    /// Extent of the differences between rival and photo, over the photo's edges, with the rival laid over it by
+    /// `photo_from_own`.
     fn share_differing(&self, photo: &CloseUp, photo_from_own: &PlanarSimilarity) -> f64 {
         self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
@@ -225,8 +229,9 @@ impl CloseUp {
 /// A rival in the photo's frame.
 struct LaidOver {
     expected: Expected,
-    /// The photo's edges that the rival lacks, and the rival's that the photo lacks.
+    /// The photo's edges that the rival lacks.
     photos: Differing,
+    /// The rival's edges that the photo lacks.
     rivals: Differing,
 }
 

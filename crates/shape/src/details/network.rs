@@ -29,10 +29,11 @@ pub(super) const CELLS_SIDE: usize = 16;
 pub(super) const CELL: usize = SIDE / CELLS_SIDE;
 /// Minimum share of a cell inside the outline for the cell to count.
 const MIN_INSIDE: f32 = 0.3;
-/// Largest log-odds of a cell where no cell counts.
+/// Used as the largest log-odds of a cell if no cell counts.
 const NO_CELL: f32 = -20.0;
 const NUM_OUTPUTS: usize = 64;
-/// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, the mean probability of the cells.
+/// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, and the mean probability of the
+/// cells.
 const NUM_POOLED: usize = 2 * NUM_OUTPUTS + 2;
 const NUM_HIDDEN: usize = 64;
 
@@ -70,8 +71,8 @@ impl Network {
         &SHIPPED
     }
 
-    /// Reads a safetensors file: `tower.N.weight`, `compared.N.weight`, `cells.weight`, `hidden.weight`, `answer.weight`, each with outputs
-    /// first, and a `.bias` for each.
+    /// Reads a safetensors file: `tower.N.weight`, `compared.N.weight`, `cells.weight`, `hidden.weight`,
+    /// `answer.weight`, each with outputs first, and a `.bias` for each.
     fn read(bytes: &[u8]) -> Result<Self, ShapeError> {
         let file = SafeTensors::deserialize(bytes).map_err(|error| ShapeError::Weights(error.to_string()))?;
         let convolutions = |name: &str, layers: &[Layer]| {

@@ -16,9 +16,9 @@ pub(crate) struct GradientLevel {
     height: usize,
     /// Each with a fourth number, so that it is read in one load.
     samples: Vec<[f32; 4]>,
-    /// Samples per row, and the index of the first sample in a level with that number of samples per row; 0 in a whole
-    /// level.
+    /// Samples per row.
     stride: usize,
+    /// The index of the first sample in a level with `stride` samples per row; 0 in a whole level.
     before: usize,
     floor: f32,
     reading: Reading,
@@ -27,11 +27,13 @@ pub(crate) struct GradientLevel {
 /// Values needed for every interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    /// Width and height, and the indices of the last column and row.
+    /// Width and height.
     size: [f32; 2],
+    /// Indices of the last column and row.
     last: [f32; 2],
-    /// The last pixel that has a neighbour, and the index distance of that neighbour.
+    /// The last pixel that has a neighbour.
     last_pair: [i32; 2],
+    /// The index distance of that neighbour.
     step: [usize; 2],
 }
 

@@ -28,8 +28,8 @@ use crate::config::GradientConfig;
 
 /// Levels are added while both sides have at least this many pixels. Chosen by hand, not measured.
 const SMALLEST_LEVEL_SIDE: usize = 24;
-/// At level 6 one pixel covers 64; no part needs more. Derived from the coarsest extent of a template, 32 level pixels:
-/// a part of 2048 image pixels.
+/// A pixel of level 6 is 64 image pixels wide; no part needs a coarser level. Derived from the coarsest extent of a
+/// template, 32 level pixels: a part of 2048 image pixels.
 const MAX_LEVELS: usize = 7;
 
 /// Gradient directions of one image on a pyramid, computed once and read by any number of templates.

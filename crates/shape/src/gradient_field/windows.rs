@@ -21,12 +21,13 @@ use crate::parallel;
 
 /// Side of a cell, in level pixels. Chosen by hand to save time.
 const CELL: usize = 128;
-/// Margins of windows; the smallest that covers the read area is used. Chosen by hand to save time.
+/// Margins of windows in level pixels; the smallest that covers the read area is used. Chosen by hand to save time.
 const MARGINS: [usize; 5] = [96, 160, 256, 384, 512];
 /// Added to the requested area, for interpolation between pixels.
 const LEEWAY: f64 = 2.0;
-/// Number of rows from whose pixels the noise is estimated, and total number of pixels. Chosen by hand to save time.
+/// Number of rows from whose pixels the noise is estimated. Chosen by hand to save time.
 const QUIET_ROWS: usize = 32;
+/// Number of pixels from which the noise is estimated, in all rows together. Chosen by hand to save time.
 const QUIET_PIXELS: usize = 4096;
 
 /// The level, and the windows computed so far.

@@ -11,9 +11,9 @@ pub const SIDE: usize = 64;
 pub const NUM_CHANNELS: usize = 8;
 /// The part's longer side in the input; the surroundings of the part show whether its outline is there.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
-/// Mean brightness of the part, in photo and picture, after exposure is normalised. Values above `MAX`, four times this
-/// value, are clipped.
+/// Mean brightness of the part, in photo and picture, after exposure is normalised.
 const MEAN: f32 = 0.5;
+/// Larger values are clipped: four times [`MEAN`].
 const MAX: f32 = 2.0;
 /// Limits the brightening of a black part.
 const DARK: f32 = 0.02;

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use crate::edge_points::EdgePoint;
 use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
 
-/// Largest movement of the outer points from one pose to the next, in level pixels: directions are spread by half
-/// of it in both directions. Derived from the spread.
+/// Largest movement of the outer points from one pose to the next, in level pixels: the image's directions are spread
+/// by half of it to each side. Derived from the spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
 
 /// One angle and scale.

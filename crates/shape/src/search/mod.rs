@@ -134,12 +134,12 @@ const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
 /// Bounds of the range of scales; outside them the part at the swept level is too small or too large. Chosen by
 /// hand, not measured.
 const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
-/// Starts that are climbed together, and climbed starts that are followed to full resolution together. Chosen by hand
-/// to save time.
+/// Starts that are climbed together. Chosen by hand to save time.
 const STARTS_AT_ONCE: usize = 64;
+/// Climbed starts that are followed to full resolution together. Chosen by hand to save time.
 const FOLLOWED_AT_ONCE: usize = 8;
-/// Further starts are followed as long as at least one of the last eight has this agreement. Chosen by hand, below
-/// every right pose on generated parts except the lowest twentieth.
+/// Further starts are followed as long as at least one of the last eight has this agreement. Chosen by hand: 19 of 20
+/// right poses on generated parts have more.
 const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Largest gain of agreement from the agreement's level to full resolution. On the tuned sets it is 0.06 at most for 99
 /// of 100 places; a place that would gain more is not lost, but placed less exactly.
@@ -147,21 +147,24 @@ const MAX_GAIN: f64 = 0.1;
 /// Two places overlap for certain if they share this much more of the area than matches may: the share is estimated
 /// from few points, and both places still move by pixels. Chosen by hand.
 const OVERLAP_MARGIN: f64 = 0.15;
-/// Parts of one picture: the largest difference of their ln sizes, two steps of scale, and the smallest ratio of a
-/// response to the best one. Chosen by hand to save time: of ten photographed clips in a picture all are found.
+/// Largest difference of the ln sizes of the parts in one picture: two steps of scale. Chosen by hand to save time.
 const SAME_SIZE: f64 = 0.2;
+/// Minimum response of a part in a picture, as a share of the best response of its size. Chosen by hand to save time:
+/// of ten photographed clips in a picture all are found.
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
-/// Largest distance of a climb from its start: in places, and in steps of angle and scale. Slightly more than
-/// the distance of the next start. Derived from that, not measured.
+/// Largest distance of a climb from its start, in places. Slightly more than the distance of the next start. Derived
+/// from that, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
+/// The same in angle and ln scale, in steps of angle.
 const FOLLOW_STEPS: f64 = 1.5;
-/// Largest and smallest number of matches below `sure_agreement` that are refined again. Between these limits, all that
-/// may be a part are refined. Chosen by hand, not measured: more take more time.
+/// Largest number of matches below `sure_agreement` that are refined again. Chosen by hand, not measured: more take
+/// more time.
 const MAX_NUM_POLISHED: usize = 16;
+/// As many of the best are refined again even if they are probably not the part. Chosen by hand, not measured.
 const MIN_NUM_POLISHED: usize = 3;
-/// Largest share of the part's area that two matches may share. Chosen by hand, not measured.
+/// Largest fraction of the part's area in which two matches may overlap. Chosen by hand, not measured.
 const MAX_OVERLAP: f64 = 0.3;
 
 /// Searches whole images for one taught part.
@@ -246,7 +249,7 @@ impl ShapeSearch {
     pub fn search_picture(&self, picture: &Picture<'_>) -> Vec<Match> {
         let field = picture.field;
         if self.sweep_level_idx >= field.num_levels() || field.width().min(field.height()) == 0 {
-            // The image is smaller than the part.
+            // The image is too small for the swept level.
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);

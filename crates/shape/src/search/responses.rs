@@ -27,7 +27,8 @@ use crate::parallel;
 /// Directions over 180°; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived from that loss and
 /// from the number of tables, which must fit in a byte.
 pub(crate) const NUM_DIRECTIONS: usize = 16;
-/// Response of an edge of exactly the table's direction. Small, so that 16 of them add up within a byte. Derived: 17 × 15 is 255.
+/// Response of an edge of exactly the table's direction. Small, so that 17 of them add up within a byte. Derived: 255
+/// is 17 times 15.
 pub(crate) const FULL: u8 = 15;
 
 /// The direction nearest to `(cos 2φ, sin 2φ)`.
@@ -36,8 +37,8 @@ pub(crate) fn direction_idx(double: [f32; 2]) -> usize {
     (double[1].atan2(double[0]) / step).round().rem_euclid(NUM_DIRECTIONS as f32) as usize % NUM_DIRECTIONS
 }
 
-/// Level pixels from one place to the next. Chosen together with [`SPREAD`]: the responses of neighbouring places overlap.
-/// Not measured.
+/// Level pixels from one place to the next. Chosen together with [`SPREAD`]: the responses of neighbouring places
+/// overlap. Not measured.
 pub(crate) const PITCH: usize = 2;
 /// How far responses are spread, in level pixels in every direction. Chosen by hand, not measured.
 pub(crate) const SPREAD: usize = 2;
@@ -57,8 +58,9 @@ pub(crate) fn table_idx(k: usize, x: usize, y: usize) -> usize {
 /// A table is flat; the pixels of place `(x, y)` are at [`Responses::idx_of`]. Adjacent rows share the padding between
 /// them.
 pub(crate) struct Responses {
-    /// Places per row, and rows of places.
+    /// Places per row.
     pub(crate) width: usize,
+    /// Rows of places.
     pub(crate) height: usize,
     pad: usize,
     tables: Vec<Vec<u8>>,

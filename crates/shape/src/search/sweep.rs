@@ -5,8 +5,8 @@
 //!        ─ local maxima ─ starts, the best of each scale in turn
 //! ```
 //! A group is one scale within a range of angles of 90°, and a place keeps the best variant of each group. A part that
-//! is similar after a rotation by 180° therefore keeps both angles, and the finer levels decide. The same holds for a
-//! part in clutter or noise, where the smallest scale agrees best almost everywhere because its points are closest
+//! is similar after a rotation by 180° therefore keeps both angles, and the finer levels decide. A part in clutter or
+//! noise keeps all scales: there the smallest scale agrees best almost everywhere because its points are closest
 //! together.
 
 use pulp::{Simd, WithSimd};
