@@ -88,7 +88,7 @@ impl FromStr for ModelKind {
     }
 }
 
-/// A letter or name of no grasp model.
+/// A text that is neither a letter nor a name of a grasp model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected a grasp model out of {}, found \"{found}\"", ModelKind::ALL.map(ModelKind::letter).join(", "))]
 pub struct UnknownModel {

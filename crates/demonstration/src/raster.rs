@@ -114,7 +114,7 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Moves the pixel's colour towards `color` by the share `alpha`; the fourth float is kept.
+/// Moves the pixel's colour towards `color` by the fraction `alpha`; the fourth float is kept.
 #[inline(always)]
 pub(crate) fn blend(pixel: &mut [f32; 4], color: [f32; 3], alpha: f32) {
     for k in 0..3 {

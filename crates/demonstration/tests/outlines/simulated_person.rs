@@ -13,7 +13,8 @@ use image::RgbImage;
 pub struct Agreement {
     /// Overlap of the areas.
     pub iou: f64,
-    /// Share of the true outline that runs within 3 px, or 1 % of the part's diagonal where that is more, of the proposed one.
+    /// Fraction of the true outline that runs within 3 px, or 1 % of the part's diagonal where that is more, of the
+    /// proposed one.
     pub near: f64,
 }
 

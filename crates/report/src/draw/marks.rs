@@ -10,13 +10,13 @@ use super::{
 };
 use crate::html::format_number;
 
-/// Maximum width of a tag with a word, as a share of the width of its box; chosen by eye.
+/// Maximum width of a tag with a word, as a fraction of the width of its box; chosen by eye.
 const MAX_TAG_SHARE: f64 = 2.0;
-/// Maximum height of a tag's capitals, as a share of the diagonal of the box, unless this is below the minimum in
+/// Maximum height of a tag's capitals, as a fraction of the diagonal of the box, unless this is below the minimum in
 /// pixels; chosen by eye.
 const MAX_TEXT_SHARE: f64 = 0.12;
 const MIN_TEXT_PX: f64 = 9.0;
-/// Maximum line width of a gripper, as a share of the grasp's width, so that it hides little of a small part's
+/// Maximum line width of a gripper, as a fraction of the grasp's width, so that it hides little of a small part's
 /// neighbours; chosen by eye.
 const MAX_GRIPPER_SHARE: f64 = 0.1;
 
