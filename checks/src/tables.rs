@@ -19,8 +19,8 @@ pub struct Table {
     pub paragraphs: Vec<String>,
 }
 
-/// A comment about the table on the next line. If no table is there, it applies to the tables of the rest of its section
-/// that have no mark of their own.
+/// A comment about the table on the next line. If no table is there, it applies to the tables of the rest of its
+/// section that have no mark of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mark {
     /// `<!-- measured: a, b -->`: names of measurements.

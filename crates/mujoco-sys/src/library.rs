@@ -40,7 +40,8 @@ pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -
 /// Unless [`crate::load`] has succeeded.
 pub unsafe fn set_handlers(on_error: Handler, on_warning: Handler) {
     let functions = functions();
-    // SAFETY: both point at statics of the library, which is never closed; the caller promises that no thread reads them.
+    // SAFETY: both point at statics of the library, which is never closed; the caller promises that no thread reads
+    // them.
     unsafe {
         *functions.user_error = Some(on_error);
         *functions.user_warning = Some(on_warning);
@@ -69,8 +70,8 @@ macro_rules! functions {
         impl Functions {
             fn load() -> Result<Self, LibraryError> {
                 let library = open(&NAMES)?;
-                // SAFETY: until the version is checked, only `mj_version` and functions that set default values are called,
-                // and these symbols have the types of that version's header.
+                // SAFETY: until the version is checked, only `mj_version` and functions that set default values are
+                // called, and these symbols have the types of that version's header.
                 unsafe {
                     Ok(Self {
                         $($name: *symbol(&library, stringify!($name))?,)*
