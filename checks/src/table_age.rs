@@ -1,4 +1,4 @@
-//! Whether a document's tables of figures tell their commit and whether the program changed since.
+//! Whether a document's tables of figures state their commit and whether the program changed since.
 
 use crate::measurements::{Measurement, Measurements};
 use crate::tables::{Mark, Table, tables};
@@ -15,7 +15,7 @@ pub enum Age {
     Old(String),
     /// The commit is not in the history.
     NoCommit,
-    /// The history is not here, so that nothing is known.
+    /// The history is missing, so the age is unknown.
     Unknown,
 }
 
