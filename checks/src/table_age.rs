@@ -6,7 +6,7 @@ use crate::tables::{Mark, Table, tables};
 /// The words beside a table whose program changed.
 pub const CHANGED_SINCE: &str = "changed since";
 
-/// A measurement's age: its commit is no ancestor of HEAD, or a file changed after it, or neither.
+/// Whether the program changed since a measurement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Age {
     /// The program is the same.

@@ -1,6 +1,7 @@
 //! MuJoCo's functions, in a library that is loaded at first use.
 //!
-//! A program linked to libmujoco does not start without it, although most of its commands need no simulator.
+//! A program linked to libmujoco does not start without the library, although most of the program's commands need no
+//! simulator.
 
 use std::ffi::{c_char, c_int, c_uchar};
 use std::sync::OnceLock;

@@ -186,7 +186,7 @@ impl ColorMixture {
         self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
     }
 
-    /// The shadow in which a learnt colour looks like this one: of all Gaussians, that with the smallest tint.
+    /// The shadow in which a learnt colour looks like this one: of all possible shadows, that with the smallest tint.
     pub fn shade_of(&self, color: &Lab) -> Option<Shade> {
         let color = vector(color);
         let shades =
