@@ -41,7 +41,8 @@ impl ModuleGraph {
         Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
     }
 
-    /// The graph of an example: its own file, the files in the folder with the same name, and modules shared by examples.
+    /// The graph of an example: its own file, the files in the folder with the same name, and modules shared by
+    /// examples.
     ///
     /// # Errors
     /// A folder or file cannot be read.

@@ -1,4 +1,4 @@
-//! Whether a document's tables of figures tell their commit and whether the program changed since.
+//! Whether a document's tables of figures state their commit and whether the program changed since.
 
 use crate::measurements::{Measurement, Measurements};
 use crate::tables::{Mark, Table, tables};
@@ -6,7 +6,7 @@ use crate::tables::{Mark, Table, tables};
 /// The words beside a table whose program changed.
 pub const CHANGED_SINCE: &str = "changed since";
 
-/// A measurement's age: its commit is no ancestor of HEAD, or a file changed after it, or neither.
+/// Whether the program changed since a measurement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Age {
     /// The program is the same.
@@ -15,7 +15,7 @@ pub enum Age {
     Old(String),
     /// The commit is not in the history.
     NoCommit,
-    /// The history is not here, so that nothing is known.
+    /// The history is missing, so the age is unknown.
     Unknown,
 }
 

@@ -1,4 +1,4 @@
-//! The tables of a Markdown document, and the marks that tell which measurement their figures come from.
+//! The tables of a Markdown document, and the marks that name the measurements of their figures.
 
 use crate::markdown::lines_without_code;
 
@@ -11,7 +11,7 @@ pub struct Table {
     pub section: String,
     /// Its first line.
     pub header: String,
-    /// More than half of its cells begin with a number; the first column is not counted.
+    /// Whether more than half of its cells begin with a number; the first column is not counted.
     pub has_figures: bool,
     /// The mark that applies to it.
     pub mark: Option<Mark>,
@@ -19,8 +19,8 @@ pub struct Table {
     pub paragraphs: Vec<String>,
 }
 
-/// A comment about the table on the next line. If no table is there, it applies to the tables of the rest of its section
-/// that have no mark of their own.
+/// A comment about the table on the next line. If no table is there, it applies to the tables of the rest of its
+/// section that have no mark of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mark {
     /// `<!-- measured: a, b -->`: names of measurements.

@@ -13,7 +13,7 @@ use sdg_webdriver::{Browser, BrowserOptions, serve_folder};
 
 /// Maximum size of a page and its style sheet, in bytes, without its pictures.
 const MAX_PAGE_BYTES: usize = 300_000;
-/// Widths of the window in CSS pixels, and whether the dark scheme is on: colours are the same at every width.
+/// Widths of the window in CSS pixels, and whether the dark scheme is on. Colours do not depend on the width.
 const LOOKS: [(u32, bool); 3] = [(390, false), (1280, false), (1280, true)];
 
 fn site() -> PathBuf {

@@ -1,4 +1,4 @@
-//! Tables of figures tell the commit of their measurement, and whether the program changed since
+//! Tables of figures state the commit of their measurement, and whether the program changed since
 //! (docs/decisions/032-age-of-tables.md).
 #![allow(missing_docs, clippy::unwrap_used)]
 

@@ -174,7 +174,7 @@ pub enum CalibrationError {
     /// The robot poses cannot be read.
     #[error("expected robot poses as documented in docs/calibration.md, found: {found}")]
     PosesUnreadable { found: String },
-    /// A robot pose is not a rigid transform.
+    /// A robot pose is not a rigid transform, or is too far from the base.
     #[error("expected base_from_flange.{name} of {picture} to be {expected}, found {found:?}")]
     RobotPose { picture: String, name: &'static str, expected: &'static str, found: Vec<f64> },
     /// The robot poses do not determine the transform.

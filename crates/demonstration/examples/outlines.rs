@@ -1,5 +1,6 @@
 //! Compares proposed outlines with drawn ones, without clicks and after one and two clicks of a simulated person:
-//! overlap, share of the true outline within 3 px or 1 % of the part's diagonal, time; medians at the end.
+//! overlap, fraction of the true outline within 3 px (or 1 % of the part's diagonal if that is more), time; medians at
+//! the end.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example outlines -- PICTURE[:ANNOTATION] …

@@ -6,7 +6,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use crate::annotation::{Annotation, ImageFacts};
 use crate::{Error, Result};
 
-/// A click may miss the image by this much and is moved to its edge; annotation tools allow this.
+/// A click that misses the image by at most this distance is moved to its edge; annotation tools allow such clicks.
 const EDGE_TOLERANCE_PX: f64 = 1.0;
 /// Boxes, grasp lines and outlines smaller than this were clicked by mistake.
 const MIN_EXTENT_PX: f64 = 1.0;
@@ -60,7 +60,7 @@ impl Draft {
         self.finish(image)
     }
 
-    /// Checks that no mark is given in shares of the image, which would be read as a position in its first pixel.
+    /// Checks that no mark is given in fractions of the image, which would be read as a position in its first pixel.
     pub fn check_is_in_pixels(&self, image: &ImageFacts) -> Result<()> {
         let line: Vec<Point2<f64>> = self.grasp_start.iter().chain(&self.grasp_end).map(|(point, _)| *point).collect();
         let line_place = self.grasp_start.as_ref().map(|(_, place)| place.clone()).unwrap_or_default();

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::draft::Draft;
 use crate::{Error, Result};
 
-/// Largest distance of a keypoint between the ends from its expected position on the line, as a share of the line's
+/// Largest distance of a keypoint between the ends from its expected position on the line, as a fraction of the line's
 /// length …
 const MAX_STRAY_SHARE: f64 = 0.02;
 /// … and in pixels; the larger value applies.

@@ -6,7 +6,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// The grasp models, by their letters: four of the paper, and one without a network. A model is chosen by letter or name.
+/// The grasp models, by their letters: four of the paper, and one without a network. A model is chosen by letter or
+/// name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum ModelKind {
     /// Faster R-CNN; position from the box, angle from a CNN on the box's crop (paper, section IV-A).
@@ -88,7 +89,7 @@ impl FromStr for ModelKind {
     }
 }
 
-/// A letter or name of no grasp model.
+/// A text that is neither a letter nor a name of a grasp model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected a grasp model out of {}, found \"{found}\"", ModelKind::ALL.map(ModelKind::letter).join(", "))]
 pub struct UnknownModel {

@@ -8,7 +8,7 @@
 //! Row *i* belongs to the image `i.jpg` of 640×480 pixels. There are no labels and no outlines.
 //!
 //! # Source
-//! OpenDR, src/opendr/control/single_demo_grasp: augmentation and learner_utils. Boxes are hulls of turned rectangles
+//! OpenDR, src/opendr/control/single_demo_grasp: augmentation and learner_utils. Boxes are hulls of rotated rectangles
 //! there and extend beyond the image's edges; here they are clipped.
 
 use nalgebra::Point2;

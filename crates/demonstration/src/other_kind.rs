@@ -1,4 +1,4 @@
-//! The kind of a file without marks, or with marks of another program, for an error in the terms of that kind.
+//! The kind of a file without marks, or with marks of another program, so that the error can name it.
 
 use serde_json::Value;
 

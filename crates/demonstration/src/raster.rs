@@ -31,7 +31,8 @@ impl Raster {
 
     /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); outside, border pixels are repeated.
     ///
-    /// Four floats at once, without a branch: `sdg-shape`'s sampling reads three bytes of an image and ends at the border.
+    /// Four floats at once, without a branch: `sdg-shape`'s sampling reads three bytes of an image and ends at the
+    /// border.
     #[inline(always)]
     pub fn bilinear(&self, x: f32, y: f32) -> [f32; 4] {
         let u = (x - 0.5).clamp(0.0, (self.width - 1) as f32);
@@ -114,7 +115,7 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Moves the pixel's colour towards `color` by the share `alpha`; the fourth float is kept.
+/// Moves the pixel's colour towards `color` by the fraction `alpha`; the fourth float is kept.
 #[inline(always)]
 pub(crate) fn blend(pixel: &mut [f32; 4], color: [f32; 3], alpha: f32) {
     for k in 0..3 {

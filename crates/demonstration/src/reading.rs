@@ -30,7 +30,7 @@ const MAX_COVER: f64 = 0.5;
 const BOX_CONTRAST: f64 = 100.0;
 /// Number of samples across and down, over the region and its surroundings, or over the photo.
 const GRID: u32 = 64;
-/// Width of the surroundings, as a share of the region's mean side.
+/// Width of the surroundings, as a fraction of the region's mean side.
 const SURROUNDINGS: f64 = 0.25;
 /// Steps of a colour channel in a histogram.
 const STEPS: usize = 8;
@@ -169,8 +169,8 @@ fn border_contrast(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> 
     sum / count.max(1.0)
 }
 
-/// Difference between the colours inside a region and around it: 0 for the same colours in the same shares, 2 for no
-/// common ones.
+/// Difference between the colours inside a region and around it: 0 for the same colours in the same proportions, 2 for
+/// no common ones.
 fn color_difference(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> f64 {
     let margin = SURROUNDINGS * 0.5 * (bounds.width() + bounds.height());
     let mut shares = [vec![0.0; STEPS * STEPS * STEPS], vec![0.0; STEPS * STEPS * STEPS]];

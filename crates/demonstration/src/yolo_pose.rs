@@ -1,4 +1,4 @@
-//! YOLO-pose labels: a text file per image, a line per object, all values as shares of the image's width and height.
+//! YOLO-pose labels: a text file per image, a line per object, all values as fractions of the image's width and height.
 //!
 //! ```text
 //! class  centre_x centre_y width height  x y v  x y v …      without visibilities if data.yaml has none: x y  x y …
@@ -23,7 +23,7 @@ use crate::{Annotation, Error, ImageFacts, Result};
 
 /// Numbers of a line before its keypoints.
 const BOX_NUMBERS: usize = 5;
-/// Larger values of a box are not shares, even with rounding or beyond the image's edge.
+/// Larger values of a box are not fractions, even with rounding or beyond the image's edge.
 const MAX_SHARE: f64 = 1.5;
 /// More objects than a person marks on a photo; limits the cost of a hostile file.
 const MAX_OBJECTS: usize = 10_000;
@@ -169,7 +169,7 @@ fn keypoint_stride(rest: &[f64], data: &DataYaml) -> Option<usize> {
     if let Some([count, stride]) = data.keypoint_shape {
         return (rest.is_empty() || rest.len() == count * stride).then_some(stride);
     }
-    // Every third number is a visibility: shares of the image are hardly ever exactly 0, 1 or 2.
+    // Every third number is a visibility: fractions of the image are hardly ever exactly 0, 1 or 2.
     let visibilities =
         rest.len().is_multiple_of(3) && rest.iter().skip(2).step_by(3).all(|v| [0.0, 1.0, 2.0].contains(v));
     match (visibilities, rest.len().is_multiple_of(2)) {

@@ -11,7 +11,7 @@ const OPENDR_KEYPOINTS: &[u8] = include_bytes!("formats/kps_train.npy");
 /// The annotation from which all these files were made.
 const ORIGINAL: &[u8] = include_bytes!("../../../datasets/demonstrations/fuel_line/annotation.json");
 
-/// Ultralytics writes shares of the image with six digits: 640 · 5e-7 pixels, with the box's width counted in.
+/// Ultralytics writes fractions of the image with six digits: 640 · 5e-7 pixels, with the box's width counted in.
 const YOLO_ROUNDING_PX: f64 = 7e-4;
 
 fn facts(file_name: &str) -> ImageFacts<'_> {
@@ -61,7 +61,7 @@ fn opendr_s_rows_are_turned_copies_of_the_part() {
     for (row, turn) in (0..360).step_by(60).enumerate() {
         let name = format!("{row}.jpg");
         let found = Annotation::read_with(OPENDR_BOXES, Some(OPENDR_KEYPOINTS), &facts(&name)).unwrap().remove(0);
-        // As make.py turns, enlarges and moves the part.
+        // As make.py rotates, enlarges and moves the part.
         let (sin, cos) = f64::from(turn).to_radians().sin_cos();
         let placed = |p: Point2<f64>| {
             let (x, y) = (p.x - 320.0, p.y - 240.0);

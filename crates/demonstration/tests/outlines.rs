@@ -60,9 +60,10 @@ fn same_photo_same_outline() {
     assert_eq!(propose_outline(&image, &annotation.bbox), propose_outline(&image, &annotation.bbox));
 }
 
-/// Issue 19: median overlap without a click, and median share of the true outline within 3 px or 1 % of the diagonal
-/// after two clicks.
+/// Issue 19: median overlap without a click.
 const MIN_MEDIAN_OVERLAP: f64 = 0.9;
+/// Issue 19: median fraction, after two clicks, of the true outline within 3 px (or 1 % of the diagonal if that is
+/// more).
 const MIN_NEAR: f64 = 0.9;
 
 /// Pictures of generated parts (crates/part-generator/examples/outline_pictures.rs), whose outlines are exact to the
@@ -96,8 +97,8 @@ fn lamp(number: usize) -> Lamp {
 }
 
 /// Mean overlap of proposals in hard shadows, with a box around the part and with one around part and shadow. Measured:
-/// 0.791 and 0.581, as without the rule of `MIN_SHADOW`, which helps on photographs. A weaker rule (no such share) had
-/// 0.774 and 0.572.
+/// 0.791 and 0.581, as without the rule of `MIN_SHADOW`, which helps on photographs. A weaker rule (without
+/// `MIN_SHADOW`'s minimum) had 0.774 and 0.572.
 const HARD_SHADOWS: [f64; 2] = [0.785, 0.577];
 
 /// Shadows of small lamps: sharp, darker than those above, half of them without a tint.
@@ -133,12 +134,13 @@ fn hard_shadows_are_left_out() {
     }
 }
 
-/// Minimum share of a shadow, beside the part, for an outline that includes it.
+/// Minimum fraction of a shadow, beside the part, for an outline that includes it.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// A shadow is removed if the outline is as good as that of the same photo without the shadow: at most this much more
-/// of the shadow's area, and at least this share of the overlap with the true outline.
+/// A shadow is removed if the outline is nearly as good as that of the same photo without the shadow: it has at most
+/// this much more of the shadow's area.
 const SHADOW_OUT: f64 = 0.15;
+/// It also has at least this fraction of the other outline's overlap with the true one.
 const OVERLAP_KEPT: f64 = 0.9;
 /// Issue 47: eight of ten.
 const MIN_REMOVED: f64 = 0.8;

@@ -16,7 +16,8 @@ use crate::inertia::LinkInertia;
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::limits::{CartesianLimits, JointLimits};
 
-/// A geometric Jacobian: rows 0–2 the linear velocity (m/s), rows 3–5 the angular velocity (rad/s), per rad/s of a joint.
+/// A geometric Jacobian: rows 0–2 the linear velocity (m/s), rows 3–5 the angular velocity (rad/s), per rad/s of a
+/// joint.
 pub type Jacobian = SMatrix<f64, 6, NUM_JOINTS>;
 
 /// Craig's parameters of one joint and its link.

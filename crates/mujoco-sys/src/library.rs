@@ -1,6 +1,7 @@
 //! MuJoCo's functions, in a library that is loaded at first use.
 //!
-//! A program linked to libmujoco does not start without it, although most of its commands need no simulator.
+//! A program linked to libmujoco does not start without the library, although most of the program's commands need no
+//! simulator.
 
 use std::ffi::{c_char, c_int, c_uchar};
 use std::sync::OnceLock;
@@ -40,7 +41,8 @@ pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -
 /// Unless [`crate::load`] has succeeded.
 pub unsafe fn set_handlers(on_error: Handler, on_warning: Handler) {
     let functions = functions();
-    // SAFETY: both point at statics of the library, which is never closed; the caller promises that no thread reads them.
+    // SAFETY: both point at statics of the library, which is never closed; the caller promises that no thread reads
+    // them.
     unsafe {
         *functions.user_error = Some(on_error);
         *functions.user_warning = Some(on_warning);
@@ -69,8 +71,8 @@ macro_rules! functions {
         impl Functions {
             fn load() -> Result<Self, LibraryError> {
                 let library = open(&NAMES)?;
-                // SAFETY: until the version is checked, only `mj_version` and functions that set default values are called,
-                // and these symbols have the types of that version's header.
+                // SAFETY: until the version is checked, only `mj_version` and functions that set default values are
+                // called, and these symbols have the types of that version's header.
                 unsafe {
                     Ok(Self {
                         $($name: *symbol(&library, stringify!($name))?,)*

@@ -5,9 +5,9 @@
 //! A row describes the generator's default scenes of 60 parts, or all pictures of a folder (PNG, JPEG; LabelMe marks in
 //! a `.json` beside a picture are read for the part's size and contrast). Pictures are first reduced to a width of 320
 //! pixels. Columns are means over pictures: brightness, its standard deviation within a picture, saturation, the 50th,
-//! 90th and 99th percentile of the gradient's magnitude (grey levels per pixel), the fraction of pixels above 40, noise
-//! (Immerkær's estimate), the part's diagonal divided by the picture's, and the colour distance between the part's box
-//! and the frame around it.
+//! 90th and 99th percentile of the gradient's magnitude (grey levels per pixel), the fraction of pixels with a gradient
+//! above 40, noise (Immerkær's estimate), the part's diagonal divided by the picture's, and the colour distance between
+//! the part's box and the frame around it.
 
 use std::path::Path;
 

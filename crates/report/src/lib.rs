@@ -1,9 +1,9 @@
 //! Reports of runs: pictures with marks, curves, tables and animations on one self-contained page.
 //!
 //! ```text
-//! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐
-//! frames   ─ AnimationRecorder ─ Animation ───── Figure ──┤
-//! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ DIR/index.html
+//! RgbImage ─ draw_demonstration, draw_detections ─ Figure ─┐
+//! frames   ─ AnimationRecorder ─ Animation ────── Figure ──┤
+//! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ──┼─ Section ─ Report ─ DIR/index.html
 //! ```
 //!
 //! The page is one file that loads no other files and runs no script: pictures are embedded as base64, charts as inline

@@ -76,7 +76,8 @@ pub enum HandCommand {
     },
     /// Close until the fingers meet resistance.
     Grasp {
-        /// The part's width between the fingers, m. A final width outside [`GRASP_TOLERANCE_M`] is not a grasp.
+        /// The part's width between the fingers, m. A final width that differs by more than [`GRASP_TOLERANCE_M`] is
+        /// not a grasp.
         width_m: f64,
         /// Speed at which the opening changes, m/s.
         speed_m_s: f64,

@@ -15,7 +15,7 @@ pub enum StopReason {
     Interrupted,
     /// The arm reported an impossible state.
     Implausible(String),
-    /// The arm reported no state for longer than allowed by its clock ([`MAX_SILENCE_SECS`] or
+    /// By the arm's clock, two states were farther apart than allowed ([`MAX_SILENCE_SECS`] or
     /// [`Watch::allow_silence`]), or a motion did not end.
     Watchdog(String),
     /// The arm's controller is in a mode in which it does not move.

@@ -29,8 +29,8 @@ mod network;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Number of steps between the values whose differences give accelerations and jerks, because the forces of contacts in
-/// MuJoCo change from step to step.
+/// Number of steps over which velocities are differentiated to accelerations and jerks, because MuJoCo's contact forces
+/// change from step to step.
 const WINDOW: usize = 10;
 /// External torque up to which the arm counts as untouched, N·m.
 const UNTOUCHED_NM: f64 = 1.0;
@@ -43,7 +43,7 @@ const RANGE_TOLERANCE: f64 = 0.01;
 /// External torques at which a Franka stops in motions that may touch the table, N·m.
 const CONTACT_TORQUE_NM: [f64; 7] = [40.0, 40.0, 36.0, 36.0, 32.0, 28.0, 24.0];
 const MAX_CONTACT_SECS: f64 = 0.3;
-/// The allowed workspace of the hand; the paths to some of the given places lead out of it.
+/// The allowed workspace of the hand; the paths to some of the given poses lead out of it.
 const WORKSPACE: WorkspaceBox =
     WorkspaceBox { min_m: Vector3::new(0.05, -0.55, -0.05), max_m: Vector3::new(0.68, 0.55, 0.95) };
 

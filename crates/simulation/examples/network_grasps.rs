@@ -3,7 +3,7 @@
 //! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
 //!
 //! Ends with an error if an attempt in lockstep and the same one in one process differ in whether the part is held, or
-//! if in real time more than 5 of 240 fewer attempts hold the part.
+//! if in real time fewer attempts hold the part, by more than 5 of 240.
 
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};

@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_test_set OBJECT COUNT SEED FOLDER`
 //!
-//! Writes `with_000.png …`, `without_000.png …` and `truth.json` into FOLDER. Each line of `truth.json` describes an
-//! image: its file, and for images with the part the grasp in pixels and in the base frame.
+//! Writes `with_000.png …`, `without_000.png …` and `truth.json` into FOLDER. For each image, `truth.json` has its
+//! file, and for images with the part the grasp in pixels and in the base frame.
 
 use std::fs;
 use std::path::PathBuf;

@@ -13,7 +13,7 @@ use crate::workcell::Workcell;
 
 /// Velocity above which most of the friction acts, rad/s; a lower value would require a shorter time step.
 const FULL_FRICTION_RAD_S: f64 = 0.02;
-/// Cut-off frequency of the measured force, Hz, because a robot also filters its estimate.
+/// Cut-off frequency of the measured force, Hz; a robot also filters its estimate.
 const CUTOFF_HZ: f64 = 30.0;
 /// Damping that keeps the least squares bounded at singular poses.
 const DAMPING: f64 = 1e-4;
@@ -55,7 +55,8 @@ impl Workcell {
         self.peak_felt_n = self.peak_felt_n.max(self.felt_n.abs());
     }
 
-    /// The largest vertical force on the hand since the last call, N, as a robot estimates it; it includes the load.
+    /// The largest vertical force on the hand since the last call, N, as a robot estimates it; includes the load's
+    /// weight.
     pub fn take_peak_felt_n(&mut self) -> f64 {
         std::mem::take(&mut self.peak_felt_n)
     }

@@ -301,9 +301,9 @@ fn isometry_from_quaternion([x, y, z]: [f64; 3], [w, i, j, k]: [f64; 4]) -> Isom
 /// Reads the `index`th position and row-major rotation matrix.
 ///
 /// # Safety
-/// The arrays must hold more than `index` triples and ninefolds.
+/// `positions` must hold more than `index` triples, `rotations` more than `index` groups of nine.
 unsafe fn isometry_at(positions: *const f64, rotations: *const f64, index: usize) -> Isometry3<f64> {
-    // SAFETY: the caller promises more than `index` triples and ninefolds.
+    // SAFETY: the caller promises more than `index` triples and groups of nine.
     let (position, rotation) =
         unsafe { (*positions.add(3 * index).cast::<[f64; 3]>(), *rotations.add(9 * index).cast::<[f64; 9]>()) };
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&rotation));

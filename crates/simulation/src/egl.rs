@@ -56,7 +56,8 @@ fn open() -> std::result::Result<Surfaceless, String> {
 /// A context that is current on no thread.
 struct Unused(egl::Context);
 
-// SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section 3.7.3).
+// SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section
+// 3.7.3).
 unsafe impl Send for Unused {}
 
 /// Contexts that are ready for reuse. The driver compiles its shaders for each new context, which takes longer than

@@ -29,7 +29,7 @@ pub struct Gripper {
 }
 
 impl Gripper {
-    /// A hand that holds its present opening, in metres between the fingers.
+    /// A hand that holds its present opening `opening_m`, the distance between the fingers in metres.
     pub fn at_opening_m(opening_m: f64) -> Self {
         let position = finger_position_m(opening_m);
         Self { target_m: position, reference_m: position, speed_m_s: 0.05, max_force_n: 30.0 }

@@ -185,8 +185,8 @@ fn asked(bytes: &[u8], kept: &Mutex<Option<Serving>>, serve: fn() -> Serving) ->
     let port = kept.get_or_insert_with(serve).port;
     let whole = bytes.strip_prefix(HEADLESS).map_or_else(|| bytes.to_vec(), with_heads);
     let request = replaced(&whole, SEED_PORT, port.to_string().as_bytes());
-    // The server takes a client that closes its sending direction for one that is gone, so the direction stays open;
-    // the idle timeout ends an incomplete request.
+    // The server treats a client that closes its sending direction as disconnected, so the direction stays open; the
+    // idle timeout ends an incomplete request.
     let answer = exchange(port, &request, false);
     let is_answered = contains(&answer, b"HTTP/1.1 200 ");
     assert!(

@@ -35,8 +35,8 @@ const ALIKE_PX: f64 = 0.02;
 const MIN_SCALE_ERROR: f64 = 0.003;
 /// Minimum error of the board's size, in standard errors.
 const MIN_SCALE_SIGMAS: f64 = 5.0;
-/// Number of remaining equations below which the standard error itself is uncertain, so that more standard errors are
-/// required: with four pictures, which leave 11 equations, three times as many.
+/// Value of [`Solved::freedom`] below which the standard error itself is uncertain, so that more standard errors are
+/// required: with four pictures, whose `freedom` is 11, three times as many.
 const FEW_EQUATIONS: f64 = 30.0;
 /// Largest fraction of the robot's errors that may remain with another size of the board: the wrong size then causes a
 /// quarter of the squared error.

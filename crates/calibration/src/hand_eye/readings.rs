@@ -1,4 +1,4 @@
-//! Other readings of the given robot poses: frequent mistakes.
+//! Readings of the robot poses: other conventions in which they may have been written, as frequent mistakes.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use sdg_geometry::Mount;

@@ -14,7 +14,7 @@ use super::scene::Studio;
 use crate::{Demonstration, Error, Result};
 
 /// Width and height of a window relative to the part's largest diameter. In smaller windows the part fits only at some
-/// turns.
+/// angles.
 const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
 
 /// Makes samples from demonstrations: sample *i* of seed *s* is always the same, in any order of calls.
@@ -70,9 +70,9 @@ impl Augmenter {
         Ok(self)
     }
 
-    /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables,
-    /// distractors and light in a smaller picture, so that most of a network's computation concerns the part. Sides
-    /// are multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
+    /// Only windows of the frame, just large enough for the part at any angle and size: the same scale, tables,
+    /// distractors and light in a smaller picture, so that most of a network's computation concerns the part. Sides are
+    /// multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {
@@ -122,7 +122,7 @@ impl Augmenter {
                     image_from_demonstration: pose,
                     ..SampleObject::new(part, &Homography::from_similarity(&pose), size, demonstration_idx)
                 };
-                // The original's boxes are hulls of the turned box, independent of the outline.
+                // OpenDR's boxes are hulls of the rotated box, independent of the outline.
                 let hull = BoundingBox::around(part.drawn_box.corners().iter().map(|corner| pose.apply(corner)));
                 let bbox = hull.map_or(object.bbox, |hull| hull.clip(f64::from(width), f64::from(height)));
                 Sample { image: draw.paint(part, width, height), objects: vec![SampleObject { bbox, ..object }] }

@@ -16,7 +16,7 @@ pub struct AugmentationConfig {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum AugmentationStyle {
-    /// The paper's: the photo turned, tinted, shifted and scaled.
+    /// The paper's: the photo rotated, tinted, shifted and scaled.
     Paper(PaperStyle),
     /// Composed scenes, with and without the part.
     Scenes(SceneStyle),
@@ -56,9 +56,9 @@ impl Default for PaperStyle {
 /// The composed scenes; probabilities are per sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneStyle {
-    /// Share of scenes with the part.
+    /// Fraction of scenes with the part.
     pub positive_share: f32,
-    /// Share of the scenes with the part that keep the photo's own background.
+    /// Fraction of the scenes with the part that keep the photo's own background.
     pub photo_background_share: f32,
     /// Range of the part's size relative to its size in the photo (fitted to the output).
     pub scale: [f32; 2],
@@ -66,18 +66,18 @@ pub struct SceneStyle {
     pub max_foreshortening: f32,
     /// Largest change of scale across the part by perspective.
     pub max_perspective: f32,
-    /// Minimum share of the part inside the image.
+    /// Minimum fraction of the part inside the image.
     pub min_inside: f32,
     /// Maximum number of distractors in a scene (half as many around the part on the photo's own background); scenes
     /// without the part have at least one.
     pub max_distractors: usize,
-    /// Share of the distractors made from pieces of the part itself.
+    /// Fraction of the distractors made from pieces of the part itself.
     pub mutant_share: f32,
-    /// Share of the rest that are other parts, if the augmenter was given any.
+    /// Fraction of the remaining distractors that are other parts, if the augmenter was given any.
     pub other_part_share: f32,
-    /// Probability that an object covers a part of the part.
+    /// Probability that an object covers some of the part.
     pub occlusion_probability: f32,
-    /// Largest covered share of the part.
+    /// Largest covered fraction of the part.
     pub max_occluded: f32,
     /// Probability of a blurred image.
     pub blur_probability: f32,

@@ -16,7 +16,7 @@ pub(crate) struct Lamp {
     pub towards: [f32; 2],
     /// Height of the light: the third component of the unit vector towards it.
     pub elevation: f32,
-    /// Share of the light that a shadow removes, in `[0, 1]`.
+    /// Fraction of the light that a shadow removes, in `[0, 1]`.
     pub shadow: f32,
     /// Displacement of a shadow, in pixels.
     pub shadow_shift_px: f32,
@@ -55,7 +55,7 @@ pub(crate) struct Distractor<'a> {
     figure: Figure,
     material: Material<'a>,
     pub center: [f32; 2],
-    /// Cosine and sine of the turn.
+    /// Cosine and sine of the angle.
     turn: [f32; 2],
     /// Canvas pixels per unit of the figure.
     pub size_px: f32,

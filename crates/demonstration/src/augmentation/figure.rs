@@ -78,7 +78,7 @@ impl Primitive {
     }
 }
 
-/// Without `hypot`'s overflow handling, which would take most of the time here.
+/// The length of a vector without `hypot`'s overflow handling, which would take most of the time here.
 #[inline(always)]
 fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()

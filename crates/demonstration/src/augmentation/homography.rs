@@ -1,4 +1,4 @@
-//! Plane to plane: a similarity with a slight tilt, as for an inclined camera.
+//! Maps between planes: a similarity with a slight tilt, as for an inclined camera.
 
 use nalgebra::{Matrix3, Point2, Vector2};
 use sdg_geometry::{BoundingBox, PlanarSimilarity};

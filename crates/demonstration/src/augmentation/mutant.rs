@@ -5,7 +5,7 @@ use sdg_geometry::Polygon;
 
 use super::random::{SampleRng, chance, index_below, log_uniform, uniform};
 
-/// Silhouettes whose best overlap at any turn and size exceeds this count as the part itself.
+/// A mutant counts as the part itself if the overlap (IoU) of their silhouettes exceeds this at any angle and size.
 const TOO_ALIKE_IOU: f64 = 0.8;
 /// Maximum number of mutants per demonstration.
 const BANK_SIZE: usize = 24;
@@ -16,7 +16,7 @@ pub(crate) struct Mutant {
     kind: Kind,
     /// The direction of the change.
     axis: Vector2<f32>,
-    /// Radius around the centre that contains all of it, in photo pixels.
+    /// Radius around the centre that contains the whole mutant, in photo pixels.
     pub radius: f32,
 }
 
@@ -59,7 +59,7 @@ impl Mutant {
         Self { kind: Kind::Whole, axis: Vector2::new(1.0, 0.0), radius }
     }
 
-    /// Mutants of a part that do not look like it at any turn; the mirror image of a symmetric part does, and is left
+    /// Mutants of a part that do not look like it at any angle; the mirror image of a symmetric part does, and is left
     /// out.
     pub fn bank(region: &Polygon, center: Point2<f64>, area_points: &[Point2<f64>], rng: &mut SampleRng) -> Vec<Self> {
         let around: Vec<Vector2<f32>> = area_points.iter().map(|p| (p - center).cast()).collect();
@@ -137,7 +137,7 @@ impl Silhouette {
         (0..GRID).contains(&x) && (0..GRID).contains(&y) && self.inside[(y * GRID + x) as usize]
     }
 
-    /// The largest overlap of the mutant's silhouette with the part's over all turns, with equal centres, and areas
+    /// The largest overlap of the mutant's silhouette with the part's over all angles, with equal centres, and areas
     /// equalised as far as a camera's change of height could.
     fn max_iou(&self, mutant: &Mutant) -> f64 {
         let step = mutant.radius / 30.0;

@@ -1,4 +1,4 @@
-//! Tiles of noise, drawn once and read at any position, turn and scale.
+//! Tiles of noise, drawn once and read at any position, angle and scale.
 
 use rand::Rng;
 

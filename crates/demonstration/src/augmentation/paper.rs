@@ -1,4 +1,4 @@
-//! The paper's augmentation: the photo turned, tinted, shifted and scaled, black outside the photo.
+//! The paper's augmentation: the photo rotated, tinted, shifted and scaled, black outside the photo.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};

@@ -8,7 +8,7 @@ use super::homography::Homography;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, log_uniform, uniform};
 
-/// Share of the poses in which the part may extend beyond the border.
+/// Fraction of the poses in which the part may extend beyond the border.
 const OVERHANG_SHARE: f32 = 0.15;
 /// Number of attempts before the part keeps its pose in the photo.
 const TRIES: usize = 40;
@@ -63,7 +63,7 @@ fn room(low: f64, high: f64, length: f64, overhang: bool) -> Option<[f64; 2]> {
     (range[0] <= range[1]).then_some(range)
 }
 
-/// The share of the part's area inside the image.
+/// The fraction of the part's area inside the image.
 pub(crate) fn share_inside(part: &Prepared, pose: &Homography, width: f64, height: f64) -> f64 {
     let image = BoundingBox { x1: 0.0, y1: 0.0, x2: width, y2: height };
     let inside = part.area_points.iter().filter(|point| image.contains(&pose.apply(point))).count();

@@ -1,4 +1,4 @@
-//! A training sample: a picture and the parts on it.
+//! A sample: a picture and the parts on it.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -8,7 +8,7 @@ use super::homography::Homography;
 use super::prepared::Prepared;
 use crate::Annotation;
 
-/// A training picture with its truth.
+/// A picture for training or validation, with its ground truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// The picture.
@@ -21,7 +21,7 @@ pub struct Sample {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleObject {
     /// The box, clipped at the image's border: tight around the outline or, without one and in the paper's style,
-    /// around the turned box.
+    /// around the rotated box.
     pub bbox: BoundingBox,
     /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled outside
     /// the image, occluded where something covers them. Empty if no grasp is marked.

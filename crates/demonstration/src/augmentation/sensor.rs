@@ -11,7 +11,7 @@ use super::noise::NormalTable;
 use super::random::{SampleRng, chance, direction, scramble, uniform};
 use crate::raster::Raster;
 
-/// Blurs sometimes: defocus or motion.
+/// Sometimes blurs the picture, by defocus or motion.
 pub(crate) fn blur(canvas: &mut Raster, style: &SceneStyle, rng: &mut SampleRng) {
     if !chance(rng, style.blur_probability) {
         return;

@@ -10,17 +10,18 @@ const NUM_COMPONENTS: usize = 5;
 const MIN_VARIANCE: f64 = 1.0;
 /// Minimum number of samples of a Gaussian.
 const MIN_SAMPLES: usize = 4;
-/// Squared distances, in variances, within which 99 % of a Gaussian's samples lie in three dimensions.
+/// Squared Mahalanobis distance within which 99 % of a Gaussian's samples lie, in three dimensions.
 const EXPLAINED: f32 = 11.3;
-/// Minimum weight of a Gaussian (its share of the samples) for a shadow of its own.
+/// Minimum weight of a Gaussian (its fraction of the samples); colours in the shadow of a smaller one are not
+/// recognised.
 const MIN_SHADED_WEIGHT: f32 = 0.05;
-/// Minimum share of the lightness that remains in a shadow.
+/// Minimum fraction of the lightness that remains in a shadow.
 const DARKEST_SHADE: f32 = 0.5;
 /// Variance of a* and b* in a shadow, in addition to that in the light: other lamps light the shadow, too.
 const SHADE_VARIANCE: f32 = 0.3;
-/// [`DARKEST_SHADE`] where a person marked a shadow.
+/// As [`DARKEST_SHADE`], for a shadow that a person marked.
 const DARKEST_SHADE_SAID: f32 = 0.3;
-/// Maximum share of the lightness that remains in a marked shadow: hardly darker colours are not in shadow.
+/// Maximum fraction of the lightness that remains in a marked shadow: hardly darker colours are not in shadow.
 const BRIGHTEST_SAID: f32 = 0.92;
 /// Largest change of a* and b* by other light in a marked shadow.
 const MAX_TINT: f32 = 14.0;
@@ -185,7 +186,7 @@ impl ColorMixture {
         self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
     }
 
-    /// The shadow in which a learnt colour looks like this one: of all Gaussians, that with the smallest tint.
+    /// The shadow in which a learnt colour looks like this one: of all possible shadows, that with the smallest tint.
     pub fn shade_of(&self, color: &Lab) -> Option<Shade> {
         let color = vector(color);
         let shades =

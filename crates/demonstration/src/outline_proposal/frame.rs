@@ -9,11 +9,12 @@ use super::lab::Lab;
 use super::minimal_cut::{self, Edges, minimal_cut};
 use super::stroke::{OutlineStroke, Stroke};
 
-/// Surroundings around the box, as a share of its longer side …
+/// Width of the surroundings on each side of the box, as a fraction of the box's longer side …
 const MARGIN_SHARE: f64 = 0.2;
 /// … and at least, in pixels of the photo.
 const MIN_MARGIN_PX: f64 = 12.0;
-/// No pixel's colour alone decides, because shadows, highlights and noise have the colours of the other side.
+/// Maximum evidence of a pixel's colour, which never decides alone: shadows, highlights and noise have the colours of
+/// the other side.
 const MAX_EVIDENCE: f32 = 10.0;
 
 /// The box and its surroundings, in their own pixels.
@@ -164,7 +165,7 @@ impl Frame {
         Some(in_part)
     }
 
-    /// The share of the border of the marked pixels that runs along edges of the picture, in [0, 1].
+    /// The fraction of the border of the marked pixels that runs along edges of the picture, in [0, 1].
     pub fn share_along_edges(&self, marked: &[bool]) -> f64 {
         let (width, height) = (self.width, self.height());
         let (mut length, mut along_edges) = (0.0, 0.0);

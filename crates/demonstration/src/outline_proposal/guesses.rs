@@ -9,16 +9,16 @@ use super::frame::Frame;
 use super::lab::Lab;
 use super::pieces::pieces;
 
-/// Minimum share of the box that remains without shadows; below it the part itself has a shadow's colour. A thin tube
-/// fills about a twentieth of its box.
+/// Minimum fraction of the box that remains without shadows; below it the part itself has a shadow's colour. A thin
+/// tube fills about a twentieth of its box.
 const MIN_UNSHADED_SHARE: f64 = 0.02;
-/// Largest distance of a person's box from the part, as a share of the box's side, on each side.
+/// Largest distance of a person's box from the part, as a fraction of the box's side, on each side.
 const MAX_GAP: f64 = 0.1;
-/// Cost of the largest distance beyond [`MAX_GAP`], per share of the box's side.
+/// Cost of the largest distance beyond [`MAX_GAP`], per length of the box's side.
 const GAP_COST: f64 = 2.0;
 /// Bonus of the guess without shadows: a shadow's border is an edge, too, and reaches the box.
 const UNSHADED_BONUS: f64 = 0.15;
-/// Another cut gets [`UNSHADED_BONUS`], too, if it leaves out a shadow, of at least this share, that the cut of the
+/// Another cut gets [`UNSHADED_BONUS`], too, if it leaves out a shadow, of at least this fraction, that the cut of the
 /// guess without shadows includes: colours learnt from a cut often include a hard shadow. Fitted on wing bolt, drill
 /// screw and the tuned rendered sets of datasets/split.toml and on generated parts (seeds from 2^51), 367 proposals:
 /// with 0.08, 0.1, 0.12 and 0.15 the overlap of 10, 8, 8 and 5 proposals is better by 0.02 or more, that of none worse;
@@ -49,7 +49,7 @@ pub(crate) fn likeliest_cut(frame: &Frame, rounds: usize) -> Option<Vec<bool>> {
     };
     let totals: Vec<f64> = cuts.iter().map(total).collect();
     let likeliest = totals.into_iter().zip(cuts).filter(|(total, _)| *total > MIN_SCORE);
-    // The first of equal ones.
+    // Of cuts with equal scores, the first.
     likeliest.reduce(|best, other| if other.0 > best.0 { other } else { best }).map(|(_, cut)| cut.part)
 }
 
@@ -66,7 +66,7 @@ struct Guess<'a> {
 struct Cut {
     score: f64,
     is_unshaded: bool,
-    /// Shares of its pixels with colours of the surroundings, lit and in shadow.
+    /// Fractions of its pixels with colours of the surroundings, lit and in shadow.
     table: f64,
     shadow: f64,
     part: Vec<bool>,
@@ -74,7 +74,7 @@ struct Cut {
 
 impl Cut {
     /// Whether a shadow in the other cut is left out in this one. A dark part has a shadow's colours in all cuts: only
-    /// the share that this cut leaves out counts.
+    /// the fraction that this cut leaves out counts.
     fn leaves_shadow_of(&self, other: &Self) -> bool {
         other.shadow.min(other.table + other.shadow - self.table - self.shadow) > MIN_SHADOW
     }
@@ -103,7 +103,7 @@ fn guesses<'a>(frame: &'a Frame, surroundings: Option<&ColorMixture>) -> Vec<Gue
     guesses
 }
 
-/// The shares of a part that have colours of the surroundings, lit and in shadow.
+/// The fractions of a part that have colours of the surroundings, lit and in shadow.
 fn table_shares(frame: &Frame, surroundings: &ColorMixture, part: &[bool]) -> [f64; 2] {
     let (colors, _) = frame.colors_of(part);
     let (table, others): (Vec<&Lab>, Vec<&Lab>) = colors.iter().partition(|color| surroundings.explains(color));
@@ -140,7 +140,7 @@ fn lightness_threshold(frame: &Frame) -> f32 {
     (best.1 + 1) as f32 * BIN
 }
 
-/// The score of the largest piece of a cut: the share of its border that runs along edges of the picture, in [0, 1],
+/// The score of the largest piece of a cut: the fraction of its border that runs along edges of the picture, in [0, 1],
 /// minus the cost of its largest distance from a side of the box. Returned with that piece.
 fn score(frame: &Frame, cut: &[bool]) -> Option<(f64, Vec<bool>)> {
     let width = frame.width;

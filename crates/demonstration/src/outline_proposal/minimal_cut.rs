@@ -13,7 +13,7 @@ use super::lab::Lab;
 pub(crate) const SURELY_OUTSIDE: f32 = 1e3;
 /// Cost of a boundary in a flat area of the picture, per pixel of its length.
 const BOUNDARY_COST: f32 = 10.0;
-/// Share of that cost that remains on the strongest edges; it keeps outlines smooth.
+/// Fraction of that cost that remains on the strongest edges; it keeps outlines smooth.
 const MIN_COST_SHARE: f32 = 0.05;
 /// Number of passes over the picture.
 const PASSES: usize = 60;
@@ -29,7 +29,7 @@ pub(crate) struct Edges {
 impl Edges {
     /// From the colours of a picture, row by row.
     pub fn new(colors: &[Lab], width: usize) -> Self {
-        // To the right and down, like the gradient of the shares.
+        // To the right and down, like the gradient of the fractions.
         let contrast = |at: usize| {
             let right =
                 if !(at + 1).is_multiple_of(width) { colors[at].distance_squared(&colors[at + 1]) } else { 0.0 };

@@ -40,7 +40,7 @@ use strokes::Correction;
 const MAX_PIXELS: f64 = 60_000.0;
 /// Number of rounds for each guess: colours are learnt from the guess or the last cut, and the frame is cut again.
 const ROUNDS: usize = 4;
-/// Minimum share of the box for a piece to be a part.
+/// Minimum area of an outline, as a fraction of the box's area.
 const MIN_AREA_SHARE: f64 = 0.02;
 
 /// Proposes the outline of the part inside a person's box.

@@ -23,26 +23,28 @@ const MAX_DIFFERENCE: f32 = 24.0;
 /// Added to the colour difference of each step: close pixels come first, and noise does not lead across the whole
 /// picture.
 const STEP: f32 = 0.05;
-/// Size of the stroke's own surroundings, which belong to its region, as a share of the frame's diagonal.
+/// Size of the stroke's own surroundings, which belong to its region, as a fraction of the frame's diagonal.
 const RADIUS_SHARE: f64 = 0.012;
 /// A stroke changes pixels within this many times its distance to the part's border: wrong areas are often longer than
 /// wide.
 const REACH: f32 = 5.0;
-/// A stroke for the part takes in colours of the table up to this share of that distance: parts may have the table's
-/// colour.
+/// A stroke for the part takes in colours of the table within this many times its distance to the part's border: parts
+/// may have the table's colour.
 const TABLE_REACH: f32 = 1.0;
-/// Minimum value of that distance, in pixels.
+/// Minimum value of that distance for [`REACH`], in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// Minimum edge strengths at which a selected shadow ends; the one whose remaining part runs most along edges is used.
+/// Edge strengths at which a selected shadow ends; of these, the one is used that leaves the part whose border runs
+/// most along edges.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
 /// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
 /// shadow.
 const MIN_SHADOW_PX: f32 = 3.0;
-/// Minimum share of an outline that remains without a shadow, mostly in one piece; otherwise the part has the shadow's
-/// colour.
+/// Minimum size of the largest piece that remains without a shadow, as a fraction of the part; otherwise the part has
+/// the shadow's colour.
 const MIN_LEFT: f64 = 0.12;
+/// Minimum size of that piece, as a fraction of all that remains.
 const MIN_IN_ONE_PIECE: f64 = 0.6;
-/// Minimum share of the part's area for another piece of the same shadow.
+/// Minimum area of another piece of the same shadow, as a fraction of the part's area.
 const MIN_PIECE_SHARE: f64 = 0.005;
 /// Largest difference of such a piece's mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
@@ -107,8 +109,8 @@ impl<'a> Correction<'a> {
         (RADIUS_SHARE * (self.frame.width as f64).hypot(self.frame.height() as f64)) as f32
     }
 
-    /// All of the part that belongs to the shadow under a stroke, on both sides of the part, and the share along edges
-    /// of the remaining part; `None` if there is no shadow under it.
+    /// All of the part that belongs to the shadow under a stroke, on both sides of the part, and the fraction along
+    /// edges of the remaining part; `None` if there is no shadow under it.
     fn shadow(&self, stroke: &Stroke, max_edge: f32) -> Option<(f64, Vec<bool>)> {
         let Self { frame, in_part, pinned, .. } = self;
         let surroundings = self.surroundings.as_ref().filter(|_| !stroke.is_inside)?;

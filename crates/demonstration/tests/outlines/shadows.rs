@@ -18,7 +18,7 @@ pub struct Shaded {
 }
 
 impl Shaded {
-    /// Shares of the shadow and of the part inside an outline.
+    /// Fractions of the shadow and of the part inside an outline.
     pub fn shares(&self, outline: &Polygon) -> [f64; 2] {
         let held = outline.rasterize(self.part.width(), self.part.height());
         [&self.shadow, &self.part].map(|of| {
@@ -34,11 +34,11 @@ impl Shaded {
 pub struct Lamp {
     /// Direction of the shadow, in radians.
     pub direction: f64,
-    /// Length of the shadow as a share of the part's diagonal.
+    /// Length of the shadow as a fraction of the part's diagonal.
     pub length: f64,
     /// Remaining light, for red, green and blue.
     pub left: [f64; 3],
-    /// Width of the shadow's border as a share of its length: a small lamp casts a sharp one.
+    /// Width of the shadow's border as a fraction of its length: a small lamp casts a sharp one.
     pub blur: f64,
 }
 
@@ -87,7 +87,7 @@ pub fn cast(photo: &RgbImage, truth: &Polygon, lamp: &Lamp) -> Shaded {
     Shaded { image, bbox: bbox.clip(f64::from(width), f64::from(height)), part, shadow }
 }
 
-/// A mask as shares, averaged twice over squares of this radius.
+/// A mask as fractions, averaged twice over squares of this radius.
 fn blurred(mask: &Mask, radius: usize) -> Vec<f64> {
     let (width, height) = (mask.width() as usize, mask.height() as usize);
     let mut values: Vec<f64> = (0..height)

@@ -1,4 +1,5 @@
-//! A person who corrects a proposed outline: with a click into the widest part of the largest wrong piece, or with a stroke along it.
+//! A simulated person who corrects a proposed outline: by a click into the widest part of the largest wrong piece, or
+//! by a stroke along that piece.
 
 use std::collections::HashSet;
 
@@ -13,7 +14,8 @@ use image::RgbImage;
 pub struct Agreement {
     /// Overlap of the areas.
     pub iou: f64,
-    /// Share of the true outline that runs within 3 px, or 1 % of the part's diagonal where that is more, of the proposed one.
+    /// Fraction of the true outline that runs within 3 px, or 1 % of the part's diagonal where that is more, of the
+    /// proposed one.
     pub near: f64,
 }
 
@@ -60,7 +62,7 @@ pub fn stroke(proposed: &Polygon, truth: &Mask, bbox: &BoundingBox, num_points: 
     let mut line: Vec<Point2<f64>> = steps(-1.0).collect();
     line.reverse();
     line.extend(steps(1.0).skip(1));
-    // Not to the very rim, as people do.
+    // The stroke ends before the rim, as people's strokes do.
     let rim = line.len() / 6;
     let line = &line[rim..line.len() - rim];
     let points = match num_points {

@@ -9,7 +9,7 @@ use crate::wire::{HAND_PORT, HAND_VERSION, HandRequest, HandState, HandStatus, H
 
 /// Size of the hand's state in bytes.
 const STATE_SIZE: usize = 23;
-/// Timeout of a motion: homing opens and closes the fingers at the hand's own speed.
+/// Timeout of a motion: homing closes and opens the fingers at the hand's own speed.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Parameters of a connection to a hand.
@@ -81,7 +81,7 @@ impl Hand {
         self.session.receive(STATE_SIZE, true, HandState::decode)
     }
 
-    /// Finds the range of the fingers by opening and closing them. Returns whether this succeeded.
+    /// Finds the range of the fingers by closing and opening them. Returns whether this succeeded.
     ///
     /// # Errors
     /// [`FciError::Refused`] if the hand fails or is stopped, and the errors of the connection.

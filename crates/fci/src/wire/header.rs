@@ -56,7 +56,8 @@ impl Header {
     /// Reads a header.
     ///
     /// # Errors
-    /// [`WireError`] for fewer bytes than a header has, and for a size below the header's or above [`MAX_MESSAGE_SIZE`].
+    /// [`WireError`] for fewer bytes than a header has, and for a size below the header's or above
+    /// [`MAX_MESSAGE_SIZE`].
     pub fn decode(bytes: &[u8], kind: HeaderKind) -> Result<Self, WireError> {
         let mut header = Self { command: 0, command_id: 0, size: 0 };
         header.fields(&mut Decoder::new("header", bytes, Real::F64), kind)?;

@@ -17,7 +17,7 @@ pub type Transform = [f64; 16];
 /// The identity transform.
 pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
-/// The state that the robot sends every millisecond. The names in brackets are libfranka's.
+/// The state that the robot sends every millisecond. The names in parentheses are libfranka's.
 ///
 /// # Units and frames
 /// Units are rad, m, kg, N, N·m and seconds. `base` is libfranka's frame `O`, `flange` is `F`, `ne` is the nominal end

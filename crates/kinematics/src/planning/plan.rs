@@ -30,7 +30,7 @@ pub struct PlanOptions {
     /// Seed of the random configurations. The same seed gives the same plan.
     pub seed: u64,
     /// Minimum distance to obstacles, and between links that may not touch, at checked configurations, m. Between
-    /// these, nothing touches.
+    /// checked configurations, nothing touches.
     pub margin_m: f64,
     /// Maximum length of a motion that is added to a tree at once, rad.
     pub step_rad: f64,

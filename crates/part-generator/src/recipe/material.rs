@@ -71,7 +71,7 @@ impl Material {
         }
     }
 
-    /// Ground, brushed or turned metal.
+    /// Ground or brushed metal: scratches in one direction.
     pub fn brushed(rng: &mut Pcg64Mcg) -> Self {
         let angle = rng.angle();
         Self { brushing: Some(Brushing::Along(angle)), roughness: rng.uniform(0.2, 0.4), ..Self::metal(rng) }

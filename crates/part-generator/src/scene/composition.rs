@@ -38,7 +38,7 @@ impl Scenes {
             layout.lay(&subject.part, config.min_inside_share as f32, rng);
         }
         if present && layout.bodies.is_empty() {
-            // No position was found, for example for a large part: a smaller share of it may be inside the picture.
+            // No position was found, for example for a large part: a smaller fraction of it may be inside the picture.
             for least in [0.9, 0.7, 0.0] {
                 if layout.lay(&subject.part, least, rng) {
                     break;

@@ -10,13 +10,13 @@ use super::{
 };
 use crate::html::format_number;
 
-/// Maximum width of a tag with a word, as a share of the width of its box; chosen by eye.
+/// Maximum width of a tag with a word, as a fraction of the width of its box; chosen by eye.
 const MAX_TAG_SHARE: f64 = 2.0;
-/// Maximum height of a tag's capitals, as a share of the diagonal of the box, unless this is below the minimum in
+/// Maximum height of a tag's capitals, as a fraction of the diagonal of the box, unless this is below the minimum in
 /// pixels; chosen by eye.
 const MAX_TEXT_SHARE: f64 = 0.12;
 const MIN_TEXT_PX: f64 = 9.0;
-/// Maximum line width of a gripper, as a share of the grasp's width, so that it hides little of a small part's
+/// Maximum line width of a gripper, as a fraction of the grasp's width, so that it hides little of a small part's
 /// neighbours; chosen by eye.
 const MAX_GRIPPER_SHARE: f64 = 0.1;
 
@@ -100,9 +100,9 @@ pub fn draw_demonstration(
     }
 }
 
-/// Draws detections, ordered by decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with score and
-/// verdict. No tag covers another tag or the middle of a grasp if there is room for it at a corner of its box. Returns
-/// the areas of the tags.
+/// Draws detections, ordered by decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with score
+/// and verdict. No tag covers another tag or the middle of a grasp if there is room for it at a corner of its box.
+/// Returns the areas of the tags.
 ///
 /// A refused detection has a dashed box and no gripper, because it is not grasped.
 pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec<BoundingBox> {
@@ -171,8 +171,8 @@ impl DetectionMark<'_> {
         (5.6 * line_width).min(by_box.unwrap_or(f64::INFINITY).max(MIN_TEXT_PX))
     }
 
-    /// Lower left corners of a tag of this width and height, the preferred one first: above the box, below it, and inside
-    /// it, each at the left and at the right; without a box, at the grasp.
+    /// Lower left corners of a tag of this width and height, the preferred one first: above the box, below it, and
+    /// inside it, each at the left and at the right; without a box, at the grasp.
     fn tag_anchors(&self, line_width: f64, [width, height]: [f64; 2]) -> Vec<Point2<f64>> {
         let Some(bounds) = &self.bounds else { return self.grasp.iter().map(PlanarGrasp::center).collect() };
         let (beside, gap) = (0.4 * line_width, 0.9 * line_width);

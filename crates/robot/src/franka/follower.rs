@@ -91,7 +91,7 @@ impl<'a> Follower<'a> {
     /// The command that answers a state, `elapsed_ms` after the previous state by the robot's clock (0 for the first).
     pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
         let mut is_over = false;
-        // The trajectory already stands one cycle after the last state.
+        // The trajectory was already advanced to one cycle after the last state.
         for _ in 1..elapsed_ms.min(MAX_ELAPSED_MS) {
             is_over |= self.advance();
         }

@@ -36,7 +36,7 @@ impl HandWorker {
         self.running.as_ref().is_some_and(|running| !running.is_finished())
     }
 
-    /// Stops moving fingers; a hand at rest keeps holding its part.
+    /// Stops the fingers if they move; a hand at rest keeps holding its part.
     pub(super) fn stop_motion(&self) {
         if self.is_moving() {
             self.stop();

@@ -10,7 +10,7 @@ use crate::safety::WorkspaceBox;
 
 /// Maximum number of cells of a tray along each axis.
 const MAX_CELLS: i64 = 100;
-/// Smallest and largest pitch of cells, and size of bins, mm.
+/// Limits of the pitch of cells and of the size of bins, mm.
 const PITCHES_MM: [f64; 2] = [5.0, 1000.0];
 /// Smallest and largest height above the table of the surface under the parts, mm.
 const SURFACES_MM: [f64; 2] = [0.0, 500.0];

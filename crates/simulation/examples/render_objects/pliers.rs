@@ -1,4 +1,5 @@
-//! Combination pliers lying flat: ground steel jaws with a lap joint and a riveted pivot, dipped handles in two colours.
+//! Combination pliers lying flat: ground steel jaws with a lap joint and a riveted pivot, dipped handles in two
+//! colours.
 
 use nalgebra::Point2;
 use sdg_simulation::objects::RotationalSymmetry;

@@ -19,7 +19,7 @@ const NIP: (f64, f64) = (0.0240, 0.0042);
 const LIP: (f64, f64) = (0.0360, 0.0090);
 const BACK: f64 = -0.0420;
 const BACK_HEIGHT: f64 = 0.0128;
-/// x at which the tab with its holes starts, and its end.
+/// x of the start and of the end of the tab with the holes.
 const TAB_START: f64 = 0.0240;
 const TAB_END: f64 = 0.0530;
 const SPAN: f64 = 0.10;

@@ -25,7 +25,7 @@ const CELL_M: f64 = 0.001;
 const SAME_HEIGHT_M: f64 = 0.001;
 /// Largest height difference of surfaces that count as the same, in metres.
 const SAME_GROUND_M: f64 = 0.0015;
-/// Maximum fraction of a feature's cells under which the move may change the surface.
+/// Maximum fraction of a feature's cells that may have another surface under them after the move.
 const MAX_OTHER_GROUND: f64 = 0.04;
 /// Minimum fraction of the cells visible from above that must change.
 const MIN_CHANGE: f64 = 0.012;
@@ -210,7 +210,7 @@ impl Change {
     }
 }
 
-/// A random feature and move that pass all checks; `None` if there is none.
+/// A random feature and move that pass all checks; `None` if none is found.
 fn moved_feature(meshes: &[VisualMesh], pieces: &Pieces, rng: &mut Pcg64Mcg) -> Option<Change> {
     let all = triangles(meshes);
     let before = HeightMap::new(&all, CELL_M);
