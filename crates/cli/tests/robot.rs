@@ -55,11 +55,11 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     let dry = sdg(&[&base[..], &from, &["--dry-run", "--out", text(&out)]].concat());
     let stderr = String::from_utf8(dry.stderr).unwrap();
     assert!(dry.status.success(), "{stderr}");
-    // The grasp is 8 mm above the table, 8 mm below the marks; the run itself measures this height.
-    assert!(stderr.contains(", 8) mm in ") && stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
+    // The grasp is 9 mm above the table, 7 mm below the marks; the run itself measures this height.
+    assert!(stderr.contains(", 9) mm in ") && stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
     let soft = sdg(&[&base[..], &from, &["--dry-run", "--soft", "--out", text(&out)]].concat());
     let told = String::from_utf8(soft.stderr).unwrap();
-    assert!(soft.status.success() && told.contains("down softly to about 8 mm, or until contact"), "{told}");
+    assert!(soft.status.success() && told.contains("down softly to about 9 mm, or until contact"), "{told}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
     // The part is drawn in the picture in its colour; about ten millimetres of it are visible at this size.
