@@ -27,8 +27,8 @@ use crate::web_browser;
 
 /// Default folder of the pictures.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
-/// Number of pictures after which taking ends if nothing is missing; docs/calibration.md states this number and the
-/// next.
+/// Number of pictures after which taking ends if nothing is missing; docs/calibration.md states this number and
+/// [`MAX_TAKEN`].
 const MIN_TAKEN: usize = 12;
 /// Number of pictures after which taking always ends: more do not improve the result.
 const MAX_TAKEN: usize = 40;

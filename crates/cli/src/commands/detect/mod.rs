@@ -109,7 +109,7 @@ struct Batch<'a, W> {
     drawn: BTreeSet<String>,
     num_used: usize,
     num_failed: usize,
-    /// Whether it is the only picture of this run.
+    /// Whether this run has only one picture.
     is_alone: bool,
     last_error: String,
     /// Number of accepted detections in all pictures.
@@ -262,7 +262,7 @@ struct ImageLine<'a> {
 struct PictureRecord {
     #[serde(flatten)]
     found: FoundRecord,
-    /// Size of the part relative to the photo.
+    /// Size of the part relative to its nominal size.
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
