@@ -30,8 +30,9 @@ pub struct Version {
     pub taught_secs: u64,
     /// The model's facts and measured quality.
     pub summary: TaughtSummary,
-    /// Number of photos and of pictures without the part that it was taught from.
+    /// Number of photos that it was taught from.
     pub photos: usize,
+    /// Number of pictures without the part that it was taught from.
     pub negatives: usize,
     /// [`fingerprint`] of the teaching's inputs.
     pub material: String,

@@ -331,8 +331,8 @@ mod tests {
             let ahead = all.filter(|p| p.coords.dot(&direction) > 0.8 * p.coords.norm());
             ahead.map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min)
         };
-        // Across the baseline, the nearest window (radius 5 mm) begins 2 mm from the outline. Along the baseline, the top
-        // hides 30 mm · 0.085 / 0.3 more.
+        // Across the baseline, the nearest window (radius 5 mm) begins 2 mm from the outline. Along the baseline, the
+        // top hides 30 mm · 0.085 / 0.3 more.
         let (along, beside) = (nearest(Vector2::x()), nearest(Vector2::y()));
         assert!((0.0265..0.033).contains(&beside) && along > beside + 0.004, "{along} {beside}");
     }

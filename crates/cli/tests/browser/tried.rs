@@ -58,7 +58,7 @@ fn saved(page: &Page, css: &str) -> String {
     page.browser.run(script, &[json!(css)]).unwrap().as_str().unwrap().to_owned()
 }
 
-/// Asserts that the scores beside the parts do not cover each other, at this zoom and at a quarter of it.
+/// Asserts that the scores beside the parts do not cover each other, at this zoom and at a third of it.
 fn assert_tags_apart(page: &Page) {
     let overlaps = "const r = [...document.querySelectorAll('#overlay .tag')].map((t) => t.getBoundingClientRect());
         return [r.length, r.flatMap((a, i) => r.slice(i + 1).filter((b) => a.left < b.right && b.left < a.right
