@@ -4,7 +4,7 @@
 //! ```text
 //! pendulum.sdg                           the version in use
 //! models/pendulum-C-20261123-203107.sdg  a teaching's file
-//! models/pendulum-20261120-081500.sdg    the former file of that name, if it was not made by a teaching here
+//! models/pendulum-20261120-081500.sdg    the former pendulum.sdg, if no teaching here made it
 //! ```
 
 use std::fs;

@@ -26,7 +26,7 @@ use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
 
-/// Prints one line per image. An image that cannot be read gets a line with its error, and the run continues.
+/// Prints the detections in each image. For an image that cannot be used, reports the error and continues.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.from.is_none() {
         let own = [("--frames", args.frames.is_some()), ("--every-frame", args.every_frame)];
@@ -100,7 +100,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
 }
 
-/// Processes pictures in order and prints a line for each of them.
+/// Processes pictures in order and prints the lines of each.
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
@@ -119,7 +119,7 @@ struct Batch<'a, W> {
 }
 
 impl<W: Write> Batch<'_, W> {
-    /// Detects parts in a picture and prints its line. For a picture that cannot be used, the line has its error.
+    /// Detects parts in a picture and prints its lines. For a picture that cannot be used, reports the error.
     ///
     /// # Errors
     /// Standard output cannot be written.
