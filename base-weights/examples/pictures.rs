@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Places on the border of a box.
+/// Points on the border of a box, one pixel apart.
 fn border([x1, y1, x2, y2]: [f64; 4]) -> Vec<[f64; 2]> {
     let along = |from: f64, to: f64| (from as i64..=to as i64).map(|v| v as f64);
     let horizontal = along(x1, x2).flat_map(|x| [[x, y1], [x, y2]]);

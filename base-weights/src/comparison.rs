@@ -26,7 +26,7 @@ use crate::network::pretrain_config;
 use crate::pictures::{Pictures, look_alike_of};
 use crate::run::{Settings, Task};
 
-/// Minimum visible fraction of a part about which a pair asks.
+/// Minimum visible fraction of a part for which pairs are made.
 const MIN_VISIBLE_SHARE: f64 = 0.6;
 /// Minimum visible fraction of a part whose picture replaces the demonstration.
 const WHOLE_SHARE: f64 = 0.97;
@@ -192,7 +192,7 @@ impl Asked<'_> {
         pose.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, turn, scale))
     }
 
-    /// A random pose that counts as wrong because of one of its angle, scale and shift.
+    /// A random pose that counts as wrong because of its angle, its scale or its shift.
     fn wrong(&mut self, shown: &Shown, pose: &PlanarSimilarity, has_turn: bool) -> PlanarSimilarity {
         let near = self.near(shown, pose, 1.0);
         let (mut shift, mut turn, mut scale) = (Vector2::zeros(), 0.0, 1.0);
@@ -236,7 +236,7 @@ impl Task for ComparisonTask {
 
     fn network(&self, settings: &Settings, device: &Device) -> Result<ComparisonNetwork> {
         let network = self.config.init(device, settings.seed)?;
-        // Only the names of the stages that both networks have.
+        // Only the parameters of the stages, which both networks have.
         let trunk: StateDict = self
             .trunk
             .iter()
@@ -294,8 +294,8 @@ mod tests {
         }
         let [not, same] = means.map(|values| (values.len(), sdg_geometry::median(values).unwrap()));
         assert!(same.0 > 40 && not.0 > same.0, "{same:?} {not:?}");
-        // Look-alikes and rotated parts differ little, and light makes the same part differ: the two medians are 1.9
-        // and 2.3.
+        // Look-alikes and rotated parts differ little, and light makes the same part differ: the medians are 1.9 (same)
+        // and 2.3 (different).
         assert!(same.1 < 0.92 * not.1, "{same:?} {not:?}");
     }
 }

@@ -28,9 +28,11 @@ use sdg_training::step_seed;
 use crate::pictures::{MIN_VISIBLE_SHARE, Pictures};
 use crate::run::{Settings, Task};
 
-/// Number of rotated crops of the one view, and maximum numbers of parts and of other views per part in a step.
+/// Number of rotated crops of the one view.
 const NUM_TURNS: usize = 24;
+/// Maximum number of parts in a step.
 const MAX_PARTS: usize = 4;
+/// Maximum number of other views of a part in a step.
 const MAX_VIEWS: usize = 4;
 
 /// Standard deviation of the target distribution over the [`NUM_TURNS`] angles, around the true angle.

@@ -15,9 +15,10 @@ use sdg_part_generator::{
 /// Every second part is a look-alike of the part before it, so the network must learn to tell them apart.
 const LOOK_ALIKE_EVERY: usize = 2;
 
-/// Number of parts that a step tells apart, and number of parts adjacent in size from which they are chosen: the size,
-/// which a photo gives only roughly, must not be enough to identify a part.
+/// Number of parts that a step tells apart.
 const GROUP: usize = 8;
+/// Number of parts adjacent in size from which these are chosen: the size, which a photo gives only roughly, must not
+/// be enough to identify a part.
 const GROUP_FROM: usize = 20;
 
 /// Minimum visible fraction of a part that is a training target.

@@ -13,8 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
 
-/// Decoupled weight decay, and the norm to which each parameter's gradient is clipped; both as in teaching.
+/// Decoupled weight decay, as in teaching.
 const WEIGHT_DECAY: f64 = 1e-4;
+/// Norm to which each parameter's gradient is clipped, as in teaching.
 const MAX_GRADIENT_NORM: f64 = 10.0;
 
 /// The settings that determine a run.

@@ -21,13 +21,15 @@ use crate::network::Network;
 use crate::results::{duration, rewrite};
 
 const PICTURE: &str = "datasets/demonstrations/pendulum/image.png";
-/// Files of the download on each side, without weights.
+/// Files of our download, without weights.
 const OUR_MODULE: [&str; 2] = ["sdg_web_bg.wasm", "sdg_web.js"];
+/// Files of onnxruntime-web's download, without weights.
 const THEIR_MODULE: [&str; 3] = ["ort-wasm-simd-threaded.wasm", "ort-wasm-simd-threaded.mjs", "ort.wasm.min.mjs"];
-/// Maximum differences between the two sides' results, which add in different orders.
+/// Maximum difference between the two sides' scores, whose sums have different orders.
 const MAX_SCORE: f64 = 0.01;
+/// Maximum difference between the two sides' keypoints, in pixels of the picture.
 const MAX_PX: f64 = 0.5;
-/// Minimum number of frames per second without WebGPU, which we promise.
+/// The promised minimum number of frames per second without WebGPU.
 const MIN_FRAMES: f64 = 5.0;
 
 /// `sdg-bench browser`

@@ -22,8 +22,9 @@ const MAX_START_SECS: f64 = 0.3;
 const MAX_MEMORY_BYTES: u64 = 150_000_000;
 /// Memory limit of the run, in KiB of address space.
 const LIMIT_KIB: u32 = 256 * 1024;
-/// Number of timed starts, and number of images in the sequence.
+/// Number of timed starts.
 const STARTS: usize = 9;
+/// Number of images in the sequence.
 const FRAMES: usize = 30;
 /// Number of teaching steps; the figures depend only on the network's shape.
 const STEPS: &str = "60";

@@ -8,8 +8,9 @@ use anyhow::Result;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub number: f64,
-    /// Parts in the picture, and parts found with the size free and with the size fixed.
+    /// Number of parts in the picture.
     pub num_parts: u32,
+    /// Number of parts found with the size free and with the size fixed.
     pub found: [usize; 2],
     /// Median seconds with the size free and with the size fixed.
     pub seconds: [f64; 2],

@@ -18,8 +18,8 @@ pub fn counted(tested: &[Tested], min_score: f64) -> Counted {
     Counted { found, wrong, false_alarms }
 }
 
-/// The threshold at which the found parts minus wrong detections and false alarms are most, with its counts; the
-/// highest such threshold.
+/// The threshold with the largest number of found parts minus wrong detections and false alarms, and the counts at it;
+/// of equal thresholds, the highest.
 pub fn best_for(tested: &[Tested]) -> (f64, Counted) {
     const STEPS: u32 = 100;
     let scores = tested.iter().flat_map(|tested| &tested.detections).map(|detection| detection.score);

@@ -7,12 +7,12 @@ use serde::Serialize;
 use crate::gripper::Gripper;
 use crate::marks::Marks;
 
-/// Marks within this distance of the picture's border are taken as cut off by it, pixels.
+/// A part whose marks are within this distance of the picture's border counts as cut off, in pixels.
 const BORDER_PX: f64 = 1.0;
 /// Minimum overlap (IoU) of the box with the outline's bounding box.
 const MIN_BOX_AGREEMENT: f64 = 0.8;
-/// Minimum length of a grasp line. On a shorter line, an error of one pixel changes the angle by more than five
-/// degrees.
+/// Minimum length of a grasp line. On a shorter line, an error of one pixel changes the angle by about five degrees or
+/// more.
 const MIN_LINE_PX: f64 = 12.0;
 /// Minimum size of a part in pixels.
 const MIN_PART_PX: f64 = 24.0;
@@ -69,7 +69,8 @@ pub enum Fix {
     Box([f64; 4]),
 }
 
-/// Checks the marks on a picture of `size` pixels; `max_opening_px` is the hand's opening in this picture, if known.
+/// Checks the marks on a picture of `size` pixels; `max_opening_px` is the hand's maximum opening in this picture, if
+/// known.
 pub fn advise(marks: &Marks, size: [u32; 2], max_opening_px: Option<f64>) -> Advice {
     let lacks = |model: ModelKind| {
         let mut lacks = Vec::new();

@@ -123,10 +123,10 @@ fn is_ours(bytes: &[u8]) -> bool {
         && items("categories").all(|category| only_known(category, &["id", "name", "keypoints", "skeleton"]))
 }
 
-/// Writes the marks atomically. If nothing is marked and no file exists, no file is created.
+/// Writes the marks atomically. If nothing is marked and no file exists, creates no file and returns `false`.
 ///
 /// # Errors
-/// The marks are unsuitable for teaching, or the file cannot be written. Returns `Ok(false)` if there was nothing to write.
+/// The marks are unsuitable for teaching, or the file cannot be written.
 pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2]) -> Result<bool> {
     if !marks.has_object() && !path.exists() {
         return Ok(false);

@@ -18,7 +18,7 @@ const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// Time without a complete frame after which torn frames are a fault: single ones are common with cheap cameras.
 const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
-/// The newest picture of a camera, which a thread reads for as long as the process runs.
+/// The newest picture of a camera, which a thread reads until the camera ends or fails.
 #[derive(Debug)]
 pub struct CameraPictures(Arc<Mutex<Newest>>);
 
@@ -29,7 +29,7 @@ struct Newest {
     check: Option<Box<SizeCheck>>,
 }
 
-/// Describes the error of pictures of this width and height.
+/// Checks a picture's width and height; the error is a text for the user.
 pub type SizeCheck = dyn Fn((u32, u32)) -> Result<(), String> + Send;
 
 impl fmt::Debug for Newest {

@@ -34,7 +34,7 @@ impl Gripper {
         let along = (self.line.end - self.line.start) / length;
         let across = Vector2::new(-along.y, along.x);
         let farthest = part.vertices.iter().map(|v| (v - self.line.start).norm()).fold(0.0, f64::max) + 1.0;
-        // In the strip's frame, clipping the polygon against an image performs the cut.
+        // In the strip's frame, the swept strip is a rectangle at the origin, to which `clip` clips the polygon.
         let in_strip = Polygon {
             vertices: part
                 .vertices
@@ -51,8 +51,8 @@ impl Gripper {
         (least <= most).then_some(Reach { left: -least, right: most })
     }
 
-    /// The minimum, over all angles, of the opening needed by the same jaws about the same middle; infinite if the jaws
-    /// close on nothing at every angle.
+    /// The minimum, over angles in steps of 5 degrees, of the opening needed by the same jaws about the same middle;
+    /// infinite if the jaws close on nothing at every angle.
     pub fn narrowest(&self, part: &Polygon) -> f64 {
         const NUM_TURNS: u32 = 36;
         let center = self.line.center();

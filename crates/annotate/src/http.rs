@@ -33,7 +33,7 @@ pub struct Request {
 }
 
 impl Head {
-    /// The head of a request, or `None` where a header is not UTF-8.
+    /// The head of a request; `None` if a header is not UTF-8.
     pub fn of(parts: &Parts) -> Option<Self> {
         let text = |value: &HeaderValue| Some(std::str::from_utf8(value.as_bytes()).ok()?.to_owned());
         let headers = parts.headers.iter().map(|(name, value)| Some((name.as_str().to_owned(), text(value)?)));

@@ -70,7 +70,7 @@ pub enum LiveFaultKind {
     OtherSize,
     /// There are no more pictures, as at the end of a folder; the last one remains.
     Ended,
-    /// It failed and is not opened again.
+    /// The camera failed and is not opened again.
     Failed,
 }
 

@@ -4,7 +4,7 @@
 //! ```text
 //! pendulum.sdg                           the version in use
 //! models/pendulum-C-20261123-203107.sdg  a teaching's file
-//! models/pendulum-20261120-081500.sdg    the former file of that name, if it was not made by a teaching here
+//! models/pendulum-20261120-081500.sdg    the former pendulum.sdg, if no teaching here made it
 //! ```
 
 use std::fs;
@@ -30,8 +30,9 @@ pub struct Version {
     pub taught_secs: u64,
     /// The model's facts and measured quality.
     pub summary: TaughtSummary,
-    /// Number of photos and of pictures without the part that it was taught from.
+    /// Number of photos that it was taught from.
     pub photos: usize,
+    /// Number of pictures without the part that it was taught from.
     pub negatives: usize,
     /// [`fingerprint`] of the teaching's inputs.
     pub material: String,

@@ -10,8 +10,8 @@
 //! ```
 //! Names are relative to the project's folder for files in it. A project's folder may contain pictures that its file
 //! does not name, because they were added later: such a picture is a photo if it has marks beside it, otherwise a
-//! picture to try. In a new folder without any marks, the user chooses the photo. A photo's own project ignores the
-//! other files of the folder.
+//! picture to try. In a new folder with several pictures and no marks, the user chooses the photo. A photo's own
+//! project ignores the other files of the folder.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -39,7 +39,7 @@ const MAX_BYTES: u64 = 64 << 20;
 pub struct ProjectPlace {
     pub folder: PathBuf,
     pub file: PathBuf,
-    /// Whether the project is the folder and not a single photo in it.
+    /// Whether the folder was opened, and not a single photo in it.
     pub is_folder: bool,
 }
 
@@ -252,7 +252,8 @@ impl ProjectFile {
         Ok(())
     }
 
-    /// Without a photo, the first picture that may show the part becomes one: the only picture of a new folder.
+    /// If there is no photo, the first picture that may show the part becomes one, such as the only picture of a new
+    /// folder.
     fn choose_only_photo(&mut self) {
         if self.photos.is_empty()
             && let Some(first) = self.tried.iter().position(|tried| !tried.absent)

@@ -392,10 +392,10 @@ impl Session {
         self.teaching.model()
     }
 
-    /// All pictures with marks for `model`. Pictures without any mark are left out.
+    /// The demonstrations for teaching `model`. Pictures without any mark are left out.
     ///
     /// # Errors
-    /// No picture is marked, or one only in part.
+    /// No picture is marked, or a picture has marks but lacks some that `model` needs.
     pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
         let (label, marked, max_opening_px) = {
             let state = self.state();

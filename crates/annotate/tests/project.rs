@@ -100,7 +100,7 @@ fn a_version_keeps_the_settings_of_the_part() {
     teach(&served);
     let request = json!({"model": "S", "symmetry": 2, "fixed_height": true, "steps": 100_000}).to_string();
     let begun = served.ask("POST", "/api/teaching", request.as_bytes()).json();
-    // What is marked in the meantime is not in this teaching.
+    // Marks made in the meantime are not used by this teaching run.
     assert_eq!((&begun["photos"], &begun["negatives"]), (&json!(1), &json!(0)));
     served.ask("DELETE", "/api/teaching", b"").json();
     while served.ask("GET", "/api/teaching", b"").json()["status"] != "failed" {
@@ -134,7 +134,7 @@ fn a_picture_without_the_part_is_taught_as_such() {
     teach(&served);
     assert_eq!(is_accepted(), false);
     assert_eq!(get(&served)["models"][1]["negatives"], 1);
-    // After revoking, it is no negative any more; a demonstration cannot become one.
+    // After revoking, the picture is no longer a negative; a demonstration cannot become one.
     served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": false}").json();
     served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
     assert_eq!(served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").status, 409);

@@ -10,12 +10,12 @@ use crate::fault::{Fault, FaultKind, Result};
 
 /// Idle pools: concurrent callers use one each.
 static IDLE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
-/// Id of the process that was the first to compute and has the threads; 0 if none was.
+/// Id of the first process that computed, which owns the threads; 0 before any computation.
 static COMPUTING_PID: AtomicU32 = AtomicU32::new(0);
 /// Maximum number of threads.
 const MAX_THREADS: usize = 1024;
 
-/// Runs work on this number of threads; with `None` on one thread per core, shared by all callers.
+/// Runs work on this number of threads; `None` selects one thread per core, shared by all callers.
 ///
 /// # Errors
 /// The number is 0 or too large, the system refuses threads, or the process was forked from one with threads of this

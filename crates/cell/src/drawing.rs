@@ -19,8 +19,8 @@ pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbIm
 }
 
 /// Draws detections, which are ordered by decreasing score. Those with at least `min_score` are drawn as accepted. If
-/// reasons are given, a refused detection with a reason gets a box and a tag with score and reason, which no other such
-/// tag covers if there is room; the other refused ones get only a box.
+/// any reasons are given, every refused detection gets a box, and one with a reason also its outline and a tag with
+/// score and reason. Tags with reasons do not overlap if there is room.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl Iterator<Item = &'a GraspDetection>,
@@ -62,7 +62,7 @@ pub fn draw_region(drawn: &mut RgbImage, region: Option<&SearchRegion>) {
     draw_box(drawn, &region.bounds(), &Pen::new(Color::NEUTRAL).width(width).dashed(8.0 * width, 4.0 * width));
 }
 
-/// Draws detections with whether they are accepted and their numbers; returns the areas of their tags.
+/// Draws detections, each with its state (accepted or not) and its track number; returns the areas of their tags.
 fn draw_marked(drawn: &mut RgbImage, detections: &[(&GraspDetection, bool, Option<u64>)]) -> Vec<BoundingBox> {
     let keypoints: Vec<Vec<Keypoint>> = detections
         .iter()
@@ -143,7 +143,7 @@ fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, t
     };
     let is_free = |at: &Point2<f64>| {
         let tags = tags(*at);
-        // At an edge, several lines would be moved over each other.
+        // Lines beyond the picture's edge would be moved into it, over each other.
         let is_inside = match tags.as_slice() {
             [(top, first), .., (bottom, _)] => first.height() <= top.y && bottom.y <= height,
             _ => true,
@@ -158,12 +158,12 @@ fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, t
     }
 }
 
-/// Maximum width of a line of a reason, as a share of the picture's width; chosen by eye.
+/// Maximum width of a line of a reason, as a fraction of the picture's width. Chosen by eye.
 const MAX_REASON_SHARE: f64 = 0.45;
-/// Distance of two lines of a reason, as a share of the distance of two reasons.
+/// Line spacing within a reason, as a fraction of the step between the tried positions of a reason.
 const LINE_SHARE: f64 = 0.85;
 
-/// A text as lines that are short, or have one word.
+/// Splits a text into lines that are short or consist of one word.
 fn wrapped(text: &str, is_short: impl Fn(&str) -> bool) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -114,19 +114,19 @@ struct Sights {
 
 /// Range of heights above the table at which parts may lie, in metres, if no height is given.
 pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
-/// Margin of the range of searched sizes for errors of poses, relative to the sizes at the ends of the height range.
+/// Relative margin of the searched sizes at both ends of their range, for errors of poses.
 const SIZE_LEEWAY: f64 = 0.03;
 /// Standard deviation of a part's height from its apparent size, in metres.
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
-/// Maximum distance of the part from its previous position in a picture for measuring a height, in metres.
+/// In a picture for measuring a height: maximum horizontal distance of the part from its expected position, in metres.
 const SAME_PART_M: f64 = 0.040;
-/// Maximum relative difference of the sizes in several demonstrations for which a height is derived from the size.
+/// Maximum relative difference between the demonstrations' sizes. Above it, no height is derived from the size.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
-/// Maximum height of a part above its marks, in metres.
+/// Margin added to the height of the part's top, in metres.
 const TOP_LEEWAY_M: f64 = 0.002;
-/// Number of standard deviations around the expected height in which the surface below a part is searched.
+/// The surface is searched within this number of standard deviations of the expected height.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Minimum and maximum of the distance from the expected height within which the surface is searched, in metres.
+/// Minimum and maximum of that search distance, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
@@ -171,8 +171,8 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
-    /// Finds the part for a plan from one picture, which does not measure its height: at its given or taught height, and
-    /// only if it is not found there at any of the possible heights.
+    /// Finds the part for a plan, from one picture, which does not measure the part's height. Searches at the given or
+    /// taught height first; if no detection there is sure, takes a second picture and searches at all possible heights.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -217,8 +217,8 @@ impl<P> ModelFinder<P> {
         Ok(targets)
     }
 
-    /// Takes a picture and finds all parts in it, best first, assuming that they lie `higher_m` above the table. If
-    /// `heights_m` is given, parts at these heights above the table are found as well.
+    /// Takes a picture and finds all parts in it, best first. Assumes that they lie `higher_m` above the table; if
+    /// `heights_m` is given, also finds parts at these heights above the table.
     fn look<A: Arm>(
         &mut self,
         arm: &mut A,

@@ -1,4 +1,4 @@
-//! Detects whether the jaws of a grasp would touch another part of the picture.
+//! Detects whether the jaws of a grasp would touch another part in the picture.
 //!
 //! ```text
 //!    ┌─────┐         jaw: from half the opening outwards, as long as a finger is wide
@@ -44,7 +44,7 @@ impl Jaw {
         let (sin, cos) = grasp.angle.radians().sin_cos();
         let (along, across) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
         [-1.0, 1.0].into_iter().any(|side| {
-            // In the jaw's frame, the jaw is an image, to which the polygon is clipped.
+            // In the jaw's frame, the jaw covers (0, 0) to (length, thickness); `clip` clips to that area.
             let in_jaw = |p: &Point2<f64>| {
                 let from_middle = p - grasp.center();
                 let out = side * across.dot(&from_middle) - 0.5 * grasp.width;

@@ -50,7 +50,7 @@ impl Frames {
         matches!(self, Self::Each(camera) if camera.is_on_request())
     }
 
-    /// The next frame. For the newest frame of a stream, it waits 0.2 s at most.
+    /// The next frame. Waits at most 0.2 s for a stream's newest frame.
     pub fn take(&mut self) -> Next {
         match self {
             Self::Newest(newest) => match newest.take(MAX_WAIT) {

@@ -207,8 +207,8 @@ impl Perception {
         }
     }
 
-    /// The part's size in a picture relative to its size in the photo; `None` with a calibrated camera, where this
-    /// ratio has no meaning, or without the check.
+    /// The part's size in a picture relative to its nominal size; `None` with a calibrated camera, where this ratio has
+    /// no meaning, or without verification.
     pub fn size_of(&self, detection: &GraspDetection, picture_size: [u32; 2]) -> Option<f64> {
         match &self.view {
             View::AnyCamera(model) => model.size_of(detection, picture_size),

@@ -5,9 +5,8 @@
 //! window ─ at each height: both pictures resampled there ─ correlation ─ the height of the only clear maximum
 //! heights of the windows ─ the highest that enough windows around the part have in common ─ SurfaceHeight
 //! ```
-//! The part's own edges are anywhere between its bottom and its top, and the edges that match between two pictures
-//! depend on the view. The surface beside it is a single plane, together with the grain, scratches, shadows and edges
-//! on it.
+//! The part's own edges give no height: they are anywhere between its bottom and its top, and the view determines which
+//! of them match in two pictures. The grain, scratches, shadows and edges of the surface beside it are in one plane.
 //!
 //! Not in this module: parts and their poses.
 
@@ -27,7 +26,7 @@ const WINDOW_DISTANCE_M: [f64; 2] = [0.002, 0.040];
 const STEP_M: f64 = 0.0005;
 /// Minimum correlation of both pictures at a window's height.
 const MIN_CORRELATION: f64 = 0.8;
-/// Minimum decrease of the correlation at distances above [`LEAD_BEYOND_M`] from that height.
+/// Minimum decrease of the correlation at heights that differ from that height by more than [`LEAD_BEYOND_M`].
 const MIN_LEAD: f64 = 0.15;
 const LEAD_BEYOND_M: f64 = 0.003;
 /// Maximum number of windows that determine the surface; the nearest ones are used.
@@ -40,8 +39,8 @@ const INLIER_M: f64 = 0.001;
 const NUM_SHIFTS: usize = 4;
 /// Minimum fraction of all windows that must be on the surface.
 const MIN_SHARE: f64 = 0.3;
-/// Minimum number of quadrants around the part, of four, with windows on the surface. An object beside the part is only
-/// on one side.
+/// Minimum number of the four quadrants around the part that have windows on the surface. An object beside the part is
+/// on one side only.
 const MIN_QUADRANTS: usize = 3;
 /// Number of windows that count as one, because windows overlap and are not independent.
 const WINDOWS_PER_VOTE: f64 = 4.0;
@@ -114,7 +113,7 @@ impl PosedPicture {
     }
 }
 
-/// The height of the surface beside a part; `None` if it has no texture, or if there are several surfaces.
+/// The height of the surface beside a part; `None` if no height has enough textured windows around the part.
 pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Option<SurfaceHeight> {
     let offsets = window();
     let mut windows: Vec<(Point2<f64>, f64)> = Vec::new();
@@ -181,7 +180,7 @@ fn middles(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Vec<Point2
     let is_clear = |p: &Point2<f64>| {
         pictures.iter().all(|picture| {
             let camera_m = picture.camera.world_from_camera.translation.vector;
-            // Going up, a line of sight approaches the camera.
+            // The line of sight, at half the part's height and at its top.
             let slope = (camera_m.xy() - p.coords) / (camera_m.z - part.expected_m);
             [0.5, 1.0].into_iter().all(|share| {
                 let above = p + slope * (share * part.top_m);
@@ -332,8 +331,8 @@ mod tests {
             let ahead = all.filter(|p| p.coords.dot(&direction) > 0.8 * p.coords.norm());
             ahead.map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min)
         };
-        // Across the baseline, a window of 5 mm begins 2 mm from the outline. Along the baseline, the top hides 30 mm ·
-        // 0.085 / 0.3 more.
+        // Across the baseline, the nearest window (radius 5 mm) begins 2 mm from the outline. Along the baseline, the
+        // top hides 30 mm · 0.085 / 0.3 more.
         let (along, beside) = (nearest(Vector2::x()), nearest(Vector2::y()));
         assert!((0.0265..0.033).contains(&beside) && along > beside + 0.004, "{along} {beside}");
     }

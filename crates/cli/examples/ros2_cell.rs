@@ -99,7 +99,7 @@ impl Cell {
         let lay_m = self.workcell.base_from_object().context("a part")?.translation.z;
         let mut is_lifted = false;
         loop {
-            // On a slow computer, simulated time is dropped: otherwise requests would wait for ever, and the arm would
+            // On a slow computer, simulated time is skipped: otherwise requests would wait forever, and the arm would
             // move too fast to catch up.
             let behind_secs = begun.elapsed().as_secs_f64() - self.secs - MAX_BEHIND_SECS;
             begun += Duration::from_secs_f64(behind_secs.max(0.0));

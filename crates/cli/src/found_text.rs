@@ -9,7 +9,7 @@ use crate::paint::{Paint, Tone};
 /// Minimum score for advice. Below it, the detection does not resemble the part, and advice would mislead. Chosen by
 /// hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
-/// Minimum relative difference from the photo's size that is given as a reason. Chosen by hand.
+/// Minimum relative difference from the nominal size that is given as a reason. Chosen by hand.
 const SIZE_TOLERANCE: f64 = 0.03;
 
 /// The advice, in words, for a refused detection that may be the part.
@@ -147,7 +147,7 @@ impl Wording<'_> {
     }
 
     /// The line for a picture without accepted detections: the number of refused ones, and the best of them.
-    /// `are_listed` states whether a line for each of them follows.
+    /// `are_listed` states whether a line for each refused one follows.
     pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
             let nothing = self.doubtful("nothing to grasp");

@@ -217,7 +217,7 @@ fn another_of_the_part_in_the_photo_does_not_count_as_wrong() {
     let taught = stdout(&["teach", "--model", "S", "--demo", &photo, "--seed", "5", "--out", &model, "--json"]);
     let held_back = &serde_json::from_str::<Value>(&taught).unwrap()["held_back"];
     assert_eq!(held_back["others_in_photo"], 1, "{held_back}");
-    // With the other part in the background, every sample has a wrong detection.
+    // If the samples' backgrounds contained the other part, every sample would have a wrong detection.
     assert!(held_back["wrong"].as_u64().unwrap() <= 2, "{held_back}");
 }
 

@@ -22,11 +22,13 @@ const PARTS: [&str; 12] = [
     "circuit_board",
     "spring_clip",
 ];
-/// Seed of the tour's six samples, and the sample in which many detections are refused.
+/// Seed of the tour's six samples.
 const SEED: &str = "3";
+/// The sample in which many detections are refused.
 const SAMPLE: &str = "000003.png";
-/// Number of small pictures in a row of the sheet, and their size.
+/// Number of small pictures in a row of the sheet.
 const COLUMNS: u32 = 4;
+/// Width and height of a small picture, in pixels.
 const SMALL: [u32; 2] = [240, 180];
 
 fn pictures() -> PathBuf {

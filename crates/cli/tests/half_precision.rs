@@ -47,7 +47,7 @@ fn trained() -> GeneralizedRcnn {
         ..TrainingConfig::edge(1)
     };
     let source = SampleSource { frames: &|i| augmenter.sample(i), windows: &|i| windows.sample(i) };
-    // Without a validation, the last checkpoint is used.
+    // The only validation is at the last step; its result is a dummy.
     let unexamined = &mut |_: &GeneralizedRcnn| Ok(vec![Outcome::Missed]);
     let detector = network.init(&Device::flex().autodiff(), 1).unwrap();
     train(detector, &training, source, unexamined, &mut |_| ControlFlow::Continue(())).unwrap().detector

@@ -6,8 +6,8 @@ use serde_json::Value;
 /// The file, and the grasp on the part's shipped photo as found by the program that wrote it: position in pixels and
 /// angle in degrees.
 const KEPT: [(&str, [f64; 3]); 1] = [("pendulum-shape-format-3", [320.024685, 220.452129, -141.544785])];
-/// Tolerances in pixels and degrees: much larger than differences between instruction sets, and much smaller than what
-/// matters for a grasp.
+/// Tolerance in pixels and in degrees: much larger than the differences between instruction sets, and much smaller than
+/// an error that a grasp would show.
 const TOLERANCE: f64 = 0.01;
 
 #[test]

@@ -53,8 +53,8 @@ fn marked(annotation: &Value) -> Marked {
     }
 }
 
-/// Found, wrong and false alarms by an independent implementation of the definition, from the output of `sdg detect`
-/// and the marks in the file. Samples show at most one part, so the first hit decides.
+/// Parts, found, wrong, pictures without the part, false alarms: by an independent implementation of the definition,
+/// from the output of `sdg detect` and the marks in the file. Samples show at most one part, so the first hit decides.
 fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let file = read_json(&samples.join("annotations.json"));
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
@@ -92,7 +92,7 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
                     found += usize::from(!truth.optional);
                     is_free = false;
                 }
-                // Without marks to compare with, the box decides.
+                // For an optional instance, the overlap of the boxes is sufficient.
                 (false, true) if is_free && iou(detection, here.unwrap()) >= 0.5 => is_free = false,
                 (false, _) => wrong += 1,
             }

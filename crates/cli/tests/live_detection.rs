@@ -157,7 +157,7 @@ fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
     for line in [&lines[0], &lines[2]] {
         assert_eq!(line["detections"].as_array().unwrap().len(), 1, "{line}");
     }
-    // In the text, parts are numbered from 1; in JSON, the numbering is unchanged.
+    // In the text, parts are numbered from 1; in JSON, from 0.
     assert_eq!(lines[0]["detections"][0]["track"], 0, "{}", lines[0]);
     let words = String::from_utf8(detect(&[&right], &[]).stdout).unwrap();
     assert!(words.contains("part 1 found again, ") || words.contains("part 1 followed, "), "{words}");

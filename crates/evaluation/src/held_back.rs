@@ -22,7 +22,7 @@ const COUNT: u64 = 24;
 /// Maximum size of a sample, in pixels. Larger samples take longer without more information: the part has a few hundred
 /// pixels in any case.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
-/// Range of sample sizes for a model that knows its part's size.
+/// Range of the part's size in the samples, relative to the photo, for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 
 /// The held-out samples of a teaching run.

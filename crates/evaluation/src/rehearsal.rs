@@ -109,7 +109,7 @@ pub struct Failure {
 }
 
 impl Rehearsed {
-    /// Number of attempts in which the part was held.
+    /// Number of successful attempts: the part was held or, with a place, put down in it.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
     }

@@ -88,7 +88,7 @@ impl MarkedPhoto<'_> {
     ///
     /// # Errors
     /// The errors of [`Self::upright`]; or the marks fit in another reading of their numbers; or their file names
-    /// another existing picture.
+    /// another existing picture, which they fit as well.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();

@@ -38,8 +38,9 @@ impl State {
         !is_photo && !is_tried && path.is_file()
     }
 
-    /// Whether this file is a copy of a picture to try. One from elsewhere is copied into the folder when it becomes a
-    /// demonstration; the copy stays when that is removed. In later sessions only its name and content tell.
+    /// Whether this file is a copy of a picture to try. A picture from elsewhere is copied into the folder when it
+    /// becomes a demonstration; the copy stays when the demonstration is removed. In later sessions, the copy is
+    /// recognised only by its name and content.
     fn is_tried_copy(&self, path: &Path, name: &str) -> bool {
         self.trial_ids().map(|id| &self.trial_pictures[id]).any(|trial| {
             let is_copied = trial.became.is_some_and(|id| self.images[id].picture.path == path);

@@ -182,7 +182,7 @@ impl Session {
     }
 
     /// Makes a tried picture a demonstration with these marks. A picture from the page, or from another folder, is
-    /// copied beside the first picture under its own name: no marks are written into other folders.
+    /// copied beside the first picture under an unused name: no marks are written into other folders.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, or a file cannot be written.

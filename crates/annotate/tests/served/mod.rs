@@ -23,7 +23,7 @@ struct InPlace;
 
 struct InPlaceModel(Demonstration, Vec<RgbImage>, Mutex<Option<Region>>);
 
-/// The model read from such a file, which contains nothing: it detects nothing.
+/// The model read from a model file of these tests. The file contains no demonstration, so the model detects nothing.
 struct ReadModel(TaughtSummary, Mutex<Option<Region>>);
 
 impl TaughtModel for ReadModel {

@@ -30,7 +30,7 @@ pub struct AugmentArgs {
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
     /// Write the held-out samples instead, of at most 640x480 pixels: on them, `sdg teach` with the same seed tests the
-    /// finished model. It uses the first 40, for model S the first 24
+    /// finished model. It uses the first 24
     #[arg(long, conflicts_with = "preset")]
     pub held_back: bool,
     /// Seed of all random choices

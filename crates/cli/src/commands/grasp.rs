@@ -206,7 +206,7 @@ fn simulated(_args: &GraspArgs, _prepared: &Prepared, _interrupt: &Interrupt) ->
     .into())
 }
 
-/// One grasp with any arm. A real arm, which has an address, moves only after confirmation by a person.
+/// One grasp with any arm. A real arm, which has an address, moves only after confirmation by a person or with `--yes`.
 fn attempt<A: CompliantArm, P: Pictures<A>>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -242,7 +242,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     let camera_pose = prepared.camera.pose;
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = run_sequence(&mut robot, &mut finder, camera_pose, &prepared.config, prepared.place.as_ref());
-    // A failed step is an error, unless a picture did not show the part.
+    // A failed step is an error, unless the part was not found in a picture.
     let has_failed = match &ended {
         Ok(ended) => ended.failed.is_some() && !is_nothing_found(&ended.grasp),
         Err(_) => true,

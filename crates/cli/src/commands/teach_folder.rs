@@ -109,7 +109,7 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
     }))
 }
 
-/// Reports single parts. If a part could not be taught, the call fails, as without `--demos`.
+/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`.
 fn told(args: &TeachArgs, outcomes: Vec<(String, PartOutcome)>) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =

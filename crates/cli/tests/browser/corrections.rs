@@ -59,7 +59,7 @@ fn straight(number: usize) -> Straight {
     Straight { image, bbox, angle_deg: angle.to_degrees(), click }
 }
 
-/// The limit of issue 47.
+/// Maximum error of the gripper's angle; the limit of issue 47.
 const MAX_OFF_DEG: f64 = 3.0;
 
 #[test]
@@ -277,7 +277,7 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
     page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
     page.browser.drag(&[page.on_screen([300.0, 243.5])]).unwrap();
     page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
-    // Whether the outline or nothing is selected: its reach covers the whole rod.
+    // In the step of the outline and in that of the gripper. The outline's clickable area covers the whole rod.
     for step in ["#do-outline h2", "#do-grasp h2"] {
         page.click(step);
         page.settle();
@@ -290,7 +290,7 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
         assert!((moved.x - 40.0).abs() < 2.0 && moved.y.abs() < 2.0, "{step}: {moved}");
         assert_eq!(after.outline, before.outline, "{step}");
     }
-    // The outline beside the gripper, and its points, are still dragged.
+    // The outline beside the gripper and the outline's points can still be dragged.
     page.click("#do-outline h2");
     page.settle();
     let before = page.saved();

@@ -11,8 +11,9 @@ use super::photo_to_grasp::patiently;
 
 /// Time for which each picture is shown, in seconds.
 const STANDS: f64 = 1.8;
-/// Seed of the held-out samples, and the sample that is searched: another table, with objects that resemble the part.
+/// Seed of the held-out samples.
 const SEED: &str = "3";
+/// The searched sample: another table, with objects that resemble the part.
 const SAMPLE: &str = "000003.png";
 
 #[test]

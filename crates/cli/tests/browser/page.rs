@@ -9,8 +9,9 @@ use sdg_webdriver::{Browser, BrowserOptions};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// The pendulum's box on its photo; the middle of its handle is a good place for the grasp.
+/// The pendulum's box on its photo: left, top, right, bottom.
 pub const BOX: [f64; 4] = [255.0, 164.0, 392.0, 282.0];
+/// The grasp point: the middle of the pendulum's handle.
 pub const HOLD: [f64; 2] = [325.0, 225.0];
 
 /// The page with its server and browser; both are stopped when it is dropped.

@@ -6,8 +6,9 @@ use serde_json::Value;
 
 use super::page::{BOX, HOLD, Page, shipped_photo};
 
-/// The limits of issue 47: the page loads in under a second and is smaller than 190 KB without its photo.
+/// Maximum loading time of the page; the limit of issue 47.
 const MAX_LOAD_MS: f64 = 1000.0;
+/// Maximum size of the page without its photo; the limit of issue 47.
 const MAX_PAGE_BYTES: f64 = 190_000.0;
 
 #[test]

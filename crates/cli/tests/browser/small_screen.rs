@@ -38,7 +38,7 @@ fn stroke_tools_are_at_the_photo_and_no_button_covers_another() {
             page.assert_accessible(&format!("stroke tools at {width} px"));
         }
     }
-    // They belong to the first step only.
+    // The stroke tools are shown in the first step only.
     page.browser.emulate(390, 844, false).unwrap();
     page.click("#tab-try");
     page.settle_frames();

@@ -58,7 +58,7 @@ fn saved(page: &Page, css: &str) -> String {
     page.browser.run(script, &[json!(css)]).unwrap().as_str().unwrap().to_owned()
 }
 
-/// Asserts that the scores beside the parts do not cover each other, at this zoom and at a quarter of it.
+/// Asserts that the scores beside the parts do not cover each other, at this zoom and at a third of it.
 fn assert_tags_apart(page: &Page) {
     let overlaps = "const r = [...document.querySelectorAll('#overlay .tag')].map((t) => t.getBoundingClientRect());
         return [r.length, r.flatMap((a, i) => r.slice(i + 1).filter((b) => a.left < b.right && b.left < a.right
@@ -253,7 +253,7 @@ fn below_the_model_s_limit_the_page_warns_and_all_counts_agree() {
     page.wait_for("the limit", "return document.getElementById('least-score').value === '0.5'");
     page.settle_frames();
     assert!(page.text("#least-score-count").starts_with("Found 1 of "), "{}", page.text("#least-score-count"));
-    // Without the part, nothing is to be learnt from it.
+    // Nothing can be learnt from a picture without the part.
     let not_here =
         "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'The part is not here').click()";
     page.browser.run(not_here, &[]).unwrap();

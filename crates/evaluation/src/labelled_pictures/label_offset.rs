@@ -25,8 +25,9 @@ const MIN_AGREEING_SHARE: f64 = 0.6;
 pub struct LabelOffset {
     /// Number of detections with this offset, among all that hit no instance but are near a label that was not found.
     pub agreeing: Share,
-    /// Mean offset along and across the label's direction, in percent of the part's diagonal.
+    /// Mean offset along the label's direction, in percent of the part's diagonal.
     pub along_percent: f64,
+    /// Mean offset across the label's direction, in percent of the part's diagonal.
     pub across_percent: f64,
     /// Mean length of the offsets, in pixels.
     pub px: f64,
@@ -47,8 +48,8 @@ struct Beside {
 }
 
 impl Beside {
-    /// The same detection relative to an equivalent direction of the label: the one for which the offset is nearest to
-    /// `other`.
+    /// The same detection relative to an equivalent direction of the label: the one for which offset and angle are
+    /// nearest to those of `other`.
     fn turned_to(&self, other: &Self) -> Self {
         let count = match self.symmetry {
             RotationalSymmetry::Fold(count) => count,

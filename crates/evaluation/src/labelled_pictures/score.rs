@@ -21,7 +21,7 @@ pub(super) const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
 pub(super) const MAX_ANGLE_DEG: f64 = 10.0;
 /// Minimum overlap (IoU) of a detection with an optional instance that has no grasp.
 const SAME_PART_IOU: f64 = 0.5;
-/// Number of steps of the minimum score for which the totals are computed.
+/// Number of equal steps between the minimum scores from 0 to 1 for which the totals are computed.
 const NUM_SWEEP_STEPS: u32 = 50;
 
 /// The ground truth of an instance.

@@ -114,7 +114,7 @@ impl RawInstance {
             bail!("expected symmetry_deg to be 360 over an integer of 1 to 360, found {}", self.symmetry_deg);
         }
         let symmetry = if turns == 1.0 { RotationalSymmetry::None } else { RotationalSymmetry::Fold(turns as u32) };
-        // Only the centre and the direction are used, because the points were rounded.
+        // The points were rounded. Only their distance is used; centre and direction have their own fields.
         let (sin, cos) = Angle::from_degrees(self.angle_deg).radians().sin_cos();
         let (center, half) = (Point2::from(self.centre_px), half_length * Vector2::new(cos, sin));
         // The file has no box. A square with the same diagonal is used, which is only drawn.

@@ -36,7 +36,7 @@ pub enum PartOutcome {
         parts: usize,
         /// Number of wrong detections.
         wrong: usize,
-        /// Number of samples without the part in which it was found.
+        /// Number of samples without the part in which a detection was accepted.
         false_alarms: usize,
         /// Number of samples without the part.
         without_part: usize,

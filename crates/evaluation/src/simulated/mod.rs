@@ -8,11 +8,12 @@
 //!                                                                         └─ Summary ─ tables: Markdown, JSON, page
 //! ```
 //!
-//! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work that is
-//! stored completely or not at all: a teaching run, an attempt, the pictures of a part. A **cell** is one model on one
-//! part. Random choices depend only on the seed, the part and the attempt's number, so every model gets the same
-//! scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats
-//! them.
+//! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work for one
+//! worker: a teaching run, a model's attempts on a part, the pictures of a part. A teaching run, an attempt, and a
+//! model's results on the pictures of a part are stored completely or not at all. A **cell** is one model on one part.
+//! Random choices depend only on the seed, the part and the number of the attempt or picture, so every model gets the
+//! same scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list)
+//! repeats them.
 //!
 //! In [`sharing`], many processes share the units, on the machines of a cluster.
 //!

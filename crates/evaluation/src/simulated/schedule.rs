@@ -79,7 +79,8 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The first task that is ready; waits if no task is ready but a running one may make one ready.
+    /// The first task that is ready; waits if no task is ready but a running one may make one ready. `None` after a
+    /// stop, or if no task is left.
     fn take<U>(&self, tasks: &[Task<U>]) -> Option<usize> {
         let mut state = self.lock();
         loop {

@@ -8,7 +8,7 @@ use super::cell::{Cell, Marks};
 use super::schedule::Task;
 use super::store::Store;
 
-/// A piece of work that is stored completely or not at all.
+/// A piece of work for one worker.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.

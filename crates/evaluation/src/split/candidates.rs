@@ -27,7 +27,7 @@ enum Place {
     Wrong,
 }
 
-/// The instance that a candidate takes, so that later ones cannot take it.
+/// The kind of the instance that a candidate takes. Later candidates cannot take that instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Hit {

@@ -80,7 +80,7 @@ pub struct TableArgs {
 
 /// Relative error of the focal length whose effect is reported.
 const FOCAL_ERROR: f64 = 0.1;
-/// Maximum distance from a robot's base to a sheet.
+/// Maximum absolute value of a length in the arguments, such as the distance from the robot's base to the sheet.
 const MAX_REACH_MM: f64 = 5000.0;
 
 /// Finds the camera's pose above the sheet and writes it into a camera file.

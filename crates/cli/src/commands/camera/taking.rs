@@ -27,8 +27,8 @@ use crate::web_browser;
 
 /// Default folder of the pictures.
 const DEFAULT_FOLDER: &str = "calibration-pictures";
-/// Number of pictures after which taking ends if nothing is missing; docs/calibration.md states this number and the
-/// next.
+/// Number of pictures after which taking ends if nothing is missing; docs/calibration.md states this number and
+/// [`MAX_TAKEN`].
 const MIN_TAKEN: usize = 12;
 /// Number of pictures after which taking always ends: more do not improve the result.
 const MAX_TAKEN: usize = 40;
@@ -87,7 +87,8 @@ impl TakingArgs {
         Ok(self.from.as_ref())
     }
 
-    /// Takes pictures until nothing is missing, [`MAX_TAKEN`] are taken, the camera ends or Ctrl-C is pressed.
+    /// Takes pictures until [`MIN_TAKEN`] are taken and nothing is missing, [`MAX_TAKEN`] are taken, the camera ends or
+    /// Ctrl-C is pressed.
     ///
     /// # Errors
     /// The camera or the folder cannot be used.
@@ -238,7 +239,7 @@ impl<'a> Taking<'a> {
         draw_keypoints(&mut picture, &places, &Pen::new(BOARD).width(0.6 * width));
         let text_px = (f64::from(picture.width().max(picture.height())) / 55.0).max(8.0);
         let mut bottom = f64::from(picture.height());
-        // One line for each sentence, so that it fits into the picture.
+        // A new line after each colon, so that the text fits into the picture.
         for line in words.next.split(": ").collect::<Vec<_>>().into_iter().rev().filter(|line| !line.is_empty()) {
             draw_label(&mut picture, Point2::new(0.0, bottom), line, Color::NEUTRAL, text_px);
             bottom -= 2.5 * text_px;

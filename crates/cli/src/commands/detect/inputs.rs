@@ -30,7 +30,7 @@ pub fn check_drawn_elsewhere<'a>(folder: &Path, pictures: impl Iterator<Item = &
     Ok(())
 }
 
-/// Checks that standard input is named once, because it can be read only once.
+/// Checks that standard input is named at most once, because it can be read only once.
 ///
 /// # Errors
 /// [`Usage`] if it is named more than once.

@@ -1,8 +1,8 @@
-//! `sdg detect --from`: parts in live pictures, one line per frame.
+//! `sdg detect --from`: parts in live pictures, frame by frame.
 //!
 //! ```text
 //! camera ─ frame ─┬─ LiveTracker: tracked, and searched on a second thread ─┬─ line on standard output
-//!                 └─ --every-frame: each frame searched independently ──────┴─ picture on 127.0.0.1 (--draw)
+//!                 └─ --every-frame, --no-verify: each frame searched alone ─┴─ picture on 127.0.0.1 (--draw)
 //! ```
 
 use std::io::Write;

@@ -26,7 +26,7 @@ use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
 
-/// Prints one line per image. An image that cannot be read gets a line with its error, and the run continues.
+/// Prints the detections in each image. For an image that cannot be used, reports the error and continues.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.from.is_none() {
         let own = [("--frames", args.frames.is_some()), ("--every-frame", args.every_frame)];
@@ -100,7 +100,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
 }
 
-/// Processes pictures in order and prints a line for each of them.
+/// Processes pictures in order and prints the lines of each.
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
@@ -109,7 +109,7 @@ struct Batch<'a, W> {
     drawn: BTreeSet<String>,
     num_used: usize,
     num_failed: usize,
-    /// Whether it is the only picture of this run.
+    /// Whether this run has only one picture.
     is_alone: bool,
     last_error: String,
     /// Number of accepted detections in all pictures.
@@ -119,7 +119,7 @@ struct Batch<'a, W> {
 }
 
 impl<W: Write> Batch<'_, W> {
-    /// Detects parts in a picture and prints its line. For a picture that cannot be used, the line has its error.
+    /// Detects parts in a picture and prints its lines. For a picture that cannot be used, reports the error.
     ///
     /// # Errors
     /// Standard output cannot be written.
@@ -262,7 +262,7 @@ struct ImageLine<'a> {
 struct PictureRecord {
     #[serde(flatten)]
     found: FoundRecord,
-    /// Size of the part relative to the photo.
+    /// Size of the part relative to its nominal size.
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -33,7 +33,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         None => {
             let OwnPart { object, model, facts } = own_part(args, model, &model_file)?;
             eprintln!("{facts}");
-            // Sizes are known in metres, so that a calibrated camera is always used.
+            // Sizes are known in metres, so a calibrated camera is always used.
             camera = camera.or(Some(PinholeCamera::WRIST));
             (object, model)
         }

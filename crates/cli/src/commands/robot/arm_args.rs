@@ -37,7 +37,7 @@ impl ArmArgs {
         }
     }
 
-    /// Connects without real-time scheduling: the commands that use this run no control loop.
+    /// Connects without real-time scheduling: the commands that call this method have no control loop.
     pub(super) fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
         let address = self.address()?;
         Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))

@@ -42,7 +42,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
                 intrinsics: camera.as_deref().map(CameraFile::read_intrinsics).transpose()?,
             }
         }
-        // A camera on the hand has no fixed pose, so its pictures are only searched for the grasp service.
+        // A camera on the hand has no fixed pose: only the grasp service gets poses from its pictures.
         (None, Some(path)) if args.arm.allow_motion => {
             CameraFile::read(path).map_or(CameraPoseSource::Unknown, |camera| CameraPoseSource::File(camera.over_table))
         }

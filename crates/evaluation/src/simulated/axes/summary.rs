@@ -37,7 +37,7 @@ pub struct AxesSummary {
 /// Worker seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Seconds of all teaching runs of the measured models.
+    /// Seconds of all successful teaching runs of the measured models.
     pub teaching: f64,
     /// Seconds of pictures: rendering and detection.
     pub pictures: f64,
@@ -96,8 +96,8 @@ pub struct AxisFigures {
     pub distance_mm: Option<[f64; 2]>,
     /// Median and 90th percentile of the angle errors of all accepted detections, in degrees.
     pub turn_deg: Option<[f64; 2]>,
-    /// The fraction found in the first, the middle and the last third of the axis' pictures; the parameter of the axis
-    /// increases from the first picture to the last.
+    /// The fraction found in the first, the middle and the last third of the axis' pictures. With at most 20 pictures,
+    /// the parameter of the axis changes in one direction from the first picture to the last.
     pub thirds: [Third; 3],
     /// The fraction of each part.
     pub parts: Vec<PartShare>,
@@ -296,8 +296,8 @@ fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item 
     sum
 }
 
-/// The results by kind of look-alike, followed by the two sums. Models that could not be taught are left out, because
-/// they accept nothing.
+/// The results by kind of look-alike, followed by the two sums. A part on which the model could not be taught is left
+/// out, because nothing can be accepted.
 fn look_alikes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<LookAlikeFigures>> {
     let mut figures = Vec::new();
     if !evaluation.selection.axes.contains(&Axis::LookAlikes) {
@@ -403,7 +403,7 @@ fn grasp_figures(condition: GraspCondition, model: ModelKind, by_part: &[(&str, 
     }
 }
 
-/// The time of the teaching runs of the measured models, each counted once.
+/// The time of the successful teaching runs of the measured models, each counted once.
 fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
     let mut taught: Vec<(ModelKind, Marks)> =
         evaluation.models.iter().map(|model| (model.taught_as(), Marks::Shipped)).collect();

@@ -13,10 +13,10 @@ use crate::simulated::records::AttemptRecord;
 use crate::simulated::schedule::Task;
 use crate::simulated::store::Store;
 
-/// The models for grasps under errors: the paper's best, and the one without a network.
+/// The models for grasps under errors: the one without a network, and the paper's best.
 pub const GRASPING_MODELS: [ModelKind; 2] = [ModelKind::S, ModelKind::C];
 
-/// A piece of work that is stored completely or not at all.
+/// A piece of work for one worker.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Unit<'a> {
     /// A network is taught on a part.

@@ -155,7 +155,7 @@ mod tests {
         assert!(text.contains("| B | 3456 | 2:32 | 8.91 | 12.3 | 1500 | 7:30 | 450 | 20 |"), "{text}");
         assert!(text.contains("B reads the network taught for C, which is taught once."));
         assert!(text.contains("| rod end | 9 of 10 |\n| all | 9 of 10 |"), "{text}");
-        // There is one failure, at the lift: the sixth step after teach, detect, hover, approach and close.
+        // There is one failure, at the lift: the sixth step, after teach, detect, hover, approach and close.
         assert!(text.contains("| B | 1 of 10 | 0 | 0 | 0 | 0 | 0 | 1 | 0 | 0 |"), "{text}");
         assert!(text.contains("| B | 24 of 25 | 96.0 | 0.65 | – | – | – | 12.3 |"), "{text}");
         assert!(text.contains("the network \\| finds nothing"), "{text}");
