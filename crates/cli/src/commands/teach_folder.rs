@@ -105,6 +105,7 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
         "symmetry": symmetry,
         "size_tolerance": [args.size_tolerance.low, args.size_tolerance.high],
         "base_weights": args.base_weights,
+        "reinit": args.reinitialized,
         "version": env!("CARGO_PKG_VERSION"),
     }))
 }
