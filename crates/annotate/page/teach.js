@@ -12,7 +12,7 @@ import { percent, seconds } from "./words.js";
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
-  ["C", "Keypoints (recommended)", "The best all-round. One to four minutes."],
+  ["C", "Keypoints (recommended)", "The best all-round. Half a minute to four minutes."],
   ["S", "Shape", "Ready in seconds; weaker when partly hidden."],
   ["A", "Crop", "Turn from a crop. Longer than C."],
   ["B", "Box", "As C, at the box’s middle."],
