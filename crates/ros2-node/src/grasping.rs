@@ -10,8 +10,8 @@ use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::height::GivenHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PartFinder, PlannedArm, Robot,
-    RobotError, StepObserver, StopReason, Watch,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PlannedArm, Robot, RobotError,
+    StepObserver, StopReason, Watch,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
