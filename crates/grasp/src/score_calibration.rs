@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::check_config::ScoreConfig;
 use crate::network_calibration::NetworkCalibration;
 use crate::network_evidence::NetworkEvidence;
 
@@ -19,10 +18,11 @@ pub(crate) struct ScoreCalibration {
 
 impl ScoreCalibration {
     /// The calibration without any measurement.
+    #[cfg(feature = "teach")]
     pub(crate) const NEUTRAL: Self = Self {
         network: NetworkCalibration::NEUTRAL,
         evidence: None,
-        resemblance: ScoreConfig::DEFAULT.resemblance.neutral,
+        resemblance: crate::check_config::ScoreConfig::DEFAULT.resemblance.neutral,
     };
 
     /// The log-likelihood ratio of a place from the network's score there, 0 without a proposal; `None` without the
