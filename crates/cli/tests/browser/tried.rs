@@ -8,8 +8,8 @@ use super::page::{HOLD, Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
 use crate::support::pendulum_twice;
 
-/// A page whose model S was taught from the pendulum's photo.
-pub fn taught() -> Page {
+/// A page with the pendulum's marked photo, at the step that teaches.
+pub fn marked() -> Page {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
     let marks = repository().join("datasets/demonstrations/pendulum/annotation.json");
@@ -17,6 +17,12 @@ pub fn taught() -> Page {
     let page = Page::open_in(folder, &["photo.png"]);
     page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
     page.click("#tab-teach");
+    page
+}
+
+/// A page whose model S was taught from the pendulum's photo.
+pub fn taught() -> Page {
+    let page = marked();
     page.choose_model("S");
     page.click("#teach-start");
     patiently(&page, "a model", "return !document.getElementById('go-try').hidden");

@@ -3,9 +3,8 @@
 
 use serde_json::json;
 
-use super::page::{Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
-use super::tried::{add, photo, taught};
+use super::tried::{add, marked, photo, taught};
 
 const LEARNT: &str =
     "const text = document.getElementById('learnt').innerText; return text.startsWith('The new model finds') && text";
@@ -93,13 +92,7 @@ fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn while_the_first_model_is_taught_the_last_step_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
-    let marks = repository().join("datasets/demonstrations/pendulum/annotation.json");
-    std::fs::copy(marks, folder.path().join("photo.json")).unwrap();
-    let page = Page::open_in(folder, &["photo.png"]);
-    page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
-    page.click("#tab-teach");
+    let page = marked();
     page.unfold("#more");
     page.fill("#steps", "100000");
     page.click("#teach-start");
