@@ -102,8 +102,8 @@ pub struct EvaluateArgs {
     /// Also run every grasp without the check against the demonstration: this doubles the attempts
     #[arg(long)]
     pub unverified: bool,
-    /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, covered, dark, blur, tint,
-    /// clutter, instances, look-alikes; all: pictures), and grasps under errors (no-error, marks, mark-height,
+    /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, slant, covered, dark, blur,
+    /// tint, clutter, instances, look-alikes; all: pictures), and grasps under errors (no-error, marks, mark-height,
     /// hand-eye, friction, shake; all: grasps), instead of the paper's protocol. Without names: everything, on all
     /// parts
     #[arg(

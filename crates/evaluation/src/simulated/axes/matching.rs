@@ -5,10 +5,20 @@ use sdg_geometry::PosedCamera;
 use sdg_grasp::GraspDetection;
 use sdg_report::DetectionError;
 use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::views::Axis;
 
 use super::records::{Answer, PlacedDetection};
 use crate::against_truth::{grasp_error, grasp_pose};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
+
+/// Maximum position and angle error of a correct detection.
+pub(crate) const TOLERANCE: DetectionError = DetectionError { distance_mm: RIGHT_MM, angle_deg: RIGHT_DEGREES };
+/// The same on the axis of slants: a grasp that is off by more misses a narrow part.
+pub(super) const SLANT_TOLERANCE: DetectionError = DetectionError { distance_mm: 3.0, angle_deg: 3.0 };
+
+pub(super) fn tolerance_on(axis: Axis) -> DetectionError {
+    if axis == Axis::Slant { SLANT_TOLERANCE } else { TOLERANCE }
+}
 
 /// Compares detections (best first) with the instances of a part.
 ///
@@ -20,6 +30,7 @@ pub(super) fn place(
     camera: &PosedCamera,
     detections: &[GraspDetection],
     instances: &[Isometry3<f64>],
+    tolerance: DetectionError,
 ) -> Answer {
     let num_counted = if instances.len() <= 1 { 1 } else { usize::MAX };
     let counted: Vec<&GraspDetection> = detections
@@ -38,7 +49,7 @@ pub(super) fn place(
         })
         .collect();
     let accepted: Vec<bool> = counted.iter().map(|detection| detection.is_accepted()).collect();
-    let found = match_one_to_one(&errors, &accepted);
+    let found = match_one_to_one(&errors, &accepted, tolerance);
     let placed = counted.iter().zip(&errors).zip(found).map(|((detection, errors), found)| {
         let error = found.map_or_else(|| nearest(errors), |instance| errors[instance]);
         PlacedDetection {
@@ -53,17 +64,19 @@ pub(super) fn place(
     Answer { detections: placed.collect() }
 }
 
-fn is_right(error: &DetectionError) -> bool {
-    error.distance_mm <= RIGHT_MM && error.angle_deg <= RIGHT_DEGREES
-}
-
 fn nearest(errors: &[Option<DetectionError>]) -> Option<DetectionError> {
     errors.iter().flatten().copied().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm))
 }
 
 /// The instance that each detection finds; `errors` has the errors of every detection, best first, relative to every
 /// instance.
-pub(crate) fn match_one_to_one(errors: &[Vec<Option<DetectionError>>], accepted: &[bool]) -> Vec<Option<usize>> {
+pub(crate) fn match_one_to_one(
+    errors: &[Vec<Option<DetectionError>>],
+    accepted: &[bool],
+    tolerance: DetectionError,
+) -> Vec<Option<usize>> {
+    let is_right =
+        |error: &DetectionError| error.distance_mm <= tolerance.distance_mm && error.angle_deg <= tolerance.angle_deg;
     let mut is_taken = vec![false; errors.first().map_or(0, Vec::len)];
     errors
         .iter()
@@ -103,15 +116,16 @@ mod tests {
             vec![None, None],
             vec![error(81.0, 2.0), error(9.9, 9.9)],
         ];
-        assert_eq!(match_one_to_one(&errors, &[true; 5]), [Some(0), None, None, None, Some(1)]);
-        assert_eq!(match_one_to_one(&errors, &[false; 5]), [None; 5]);
-        assert_eq!(match_one_to_one(&[], &[]), []);
+        assert_eq!(match_one_to_one(&errors, &[true; 5], TOLERANCE), [Some(0), None, None, None, Some(1)]);
+        assert_eq!(match_one_to_one(&errors, &[true; 5], SLANT_TOLERANCE), [None, Some(0), None, None, None]);
+        assert_eq!(match_one_to_one(&errors, &[false; 5], TOLERANCE), [None; 5]);
+        assert_eq!(match_one_to_one(&[], &[], TOLERANCE), []);
     }
 
     #[test]
     fn of_two_right_instances_the_nearer_is_taken() {
         let errors = [vec![error(6.0, 1.0), error(2.0, 1.0)], vec![error(5.0, 1.0), error(3.0, 1.0)]];
-        assert_eq!(match_one_to_one(&errors, &[true; 2]), [Some(1), Some(0)]);
+        assert_eq!(match_one_to_one(&errors, &[true; 2], TOLERANCE), [Some(1), Some(0)]);
     }
 
     /// A detection with the grasp of the part at a pose, as seen by the camera.
@@ -151,18 +165,18 @@ mod tests {
         let seen = |at: &Isometry3<f64>, score| detection(&object, &camera, at, score);
         let detections =
             [seen(&instances[2], 0.9), seen(&elsewhere, 0.8), seen(&instances[0], 0.7), seen(&instances[1], 0.4)];
-        let answer = place(&object, &camera, &detections, &instances);
+        let answer = place(&object, &camera, &detections, &instances, TOLERANCE);
         assert_eq!((0..3).map(|i| answer.has_found(i)).collect::<Vec<_>>(), [true, false, true]);
         assert_eq!((answer.detections.len(), answer.num_wrong()), (3, 1));
         assert!(answer.detections[0].error_mm.unwrap() < 1e-6 && answer.detections[1].error_mm.unwrap() > 20.0);
 
         // With one instance, the best detection decides, and its position is wrong.
-        let answer = place(&object, &camera, &detections[1..], &instances[..1]);
+        let answer = place(&object, &camera, &detections[1..], &instances[..1], TOLERANCE);
         assert_eq!((answer.detections.len(), answer.num_wrong(), answer.has_found(0)), (1, 1, false));
         // Without the part, every accepted detection is wrong.
-        let answer = place(&object, &camera, &detections, &[]);
+        let answer = place(&object, &camera, &detections, &[], TOLERANCE);
         assert!(answer.is_accepted() && answer.num_wrong() == 1 && answer.detections[0].error_mm.is_none());
-        let refused = place(&object, &camera, &detections[3..], &instances);
+        let refused = place(&object, &camera, &detections[3..], &instances, TOLERANCE);
         assert!(!refused.is_accepted() && refused.detections.len() == 1 && refused.num_wrong() == 0);
     }
 }

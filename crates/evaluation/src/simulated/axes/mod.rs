@@ -29,7 +29,7 @@ mod work;
 
 pub use against::{ALL_WITH_PART, Against, RunDifference, difference_tables};
 pub use lines::{difference_lines, summary_lines};
-pub(super) use matching::match_one_to_one;
+pub(super) use matching::{TOLERANCE, match_one_to_one};
 pub use page::page;
 pub use paired::PairedCounts;
 pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};

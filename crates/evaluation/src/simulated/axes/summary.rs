@@ -84,7 +84,7 @@ pub struct AxisFigures {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Instances of the part that were found within 10 mm and 10°, of all in the pictures.
+    /// Instances of the part that were found within 10 mm and 10° (slants: 3 mm and 3°), of all in the pictures.
     pub found: Share,
     /// 95 % confidence interval (Wilson) of `found`.
     pub found_interval: [f64; 2],

@@ -1,15 +1,15 @@
 //! Tables of the results of each axis and each error, for the paper's parts and separately for the held-out ones.
 
 use sdg_grasp::ModelKind;
-use sdg_report::{Cell, Column, Table, Tone};
+use sdg_report::{Cell, Column, DetectionError, Table, Tone};
 
 use super::known_from_simulator::known_from_simulator;
+use super::matching::{SLANT_TOLERANCE, TOLERANCE};
 use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, lowest};
 use super::way::Way;
 use crate::simulated::records::AttemptRecord;
 use crate::simulated::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
-use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
 /// All tables, group by group, followed by the quantities that the robot gets from the simulator.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
@@ -96,6 +96,10 @@ fn lowest_shares(parts: &[PartShare]) -> String {
     lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
 }
 
+fn limits(DetectionError { distance_mm, angle_deg }: DetectionError) -> String {
+    format!("{distance_mm:.0} mm and {angle_deg:.0}°")
+}
+
 fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
     let models = models_of(group, way);
     let mut columns = vec![Column::text("axis"), Column::number("of")];
@@ -111,10 +115,11 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
         table = table.row(row);
     }
     let lead = format!(
-        "Instances of the part that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
-         Wilson's 95 % interval. With one instance, only the best detection counts; three instances are \
-         matched one to one. Each axis has its own pictures, the same for every model. The models do not know the \
-         camera's height."
+        "Instances of the part that were found within {} (slants: {}), in percent, with Wilson's 95 % interval. With \
+         one instance, only the best detection counts; three instances are matched one to one. Each axis has its own \
+         pictures, the same for every model. The models do not know the camera's height.",
+        limits(TOLERANCE),
+        limits(SLANT_TOLERANCE)
     );
     (format!("found, {}", way.name()), lead, table)
 }

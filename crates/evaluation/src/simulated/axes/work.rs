@@ -12,7 +12,7 @@ use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
 use sdg_simulation::views::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
 use sdg_simulation::{AttemptErrors, SimulationError};
 
-use super::matching::place;
+use super::matching::{place, tolerance_on};
 use super::records::{AxisPicture, AxisRecord, LookAlike};
 use super::selection::GraspCondition;
 use super::units::{AxesEvaluation, Unit, axis_file, grasps_file, marks_of};
@@ -195,7 +195,7 @@ fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) ->
     let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
     let answer = |verification| -> Result<_> {
         let detections = model.detect(&view.view.image, verification)?;
-        Ok(place(object, &view.view.camera, &detections, &instances))
+        Ok(place(object, &view.view.camera, &detections, &instances, tolerance_on(view.axis)))
     };
     Ok(AxisPicture {
         number,

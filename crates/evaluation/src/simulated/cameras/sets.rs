@@ -32,7 +32,9 @@ pub(super) struct Shown {
 impl PictureSet {
     /// All sets, in the order of the reports.
     pub fn all() -> Vec<Self> {
-        let axes = Axis::ALL.into_iter().filter(|axis| *axis != Axis::LookAlikes).map(Self::Axis);
+        // Slants are an axis for cameras without calibration.
+        let is_shown = |axis: &Axis| ![Axis::LookAlikes, Axis::Slant].contains(axis);
+        let axes = Axis::ALL.into_iter().filter(is_shown).map(Self::Axis);
         (0..OTHER_CAMERAS.len()).map(Self::Camera).chain(axes).chain([Self::OtherSizes]).collect()
     }
 

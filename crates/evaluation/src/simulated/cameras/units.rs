@@ -13,7 +13,7 @@ use super::records::{CameraPicture, CameraRecord, MetricAnswer};
 use super::sets::{PictureSet, Shown};
 use crate::against_truth::grasp_error;
 use crate::progress::Progress;
-use crate::simulated::axes::match_one_to_one;
+use crate::simulated::axes::{TOLERANCE, match_one_to_one};
 use crate::simulated::cell::{Cell, Marks};
 use crate::simulated::one_unit::{NO_MODEL, do_unit};
 use crate::simulated::schedule::{Task, run_all};
@@ -169,7 +169,7 @@ fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[Found]) -> C
             shown.instances.iter().map(|instance| Some(grasp_error(object, instance, &base_from_tcp))).collect()
         })
         .collect();
-    let matched = match_one_to_one(&errors, &vec![true; accepted.len()]);
+    let matched = match_one_to_one(&errors, &vec![true; accepted.len()], TOLERANCE);
     let answers = accepted.iter().zip(&errors).zip(matched).map(|(((score, pose), errors), instance)| {
         let nearest = || errors.iter().flatten().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm)).copied();
         let error = instance.map_or_else(nearest, |instance| errors[instance]);

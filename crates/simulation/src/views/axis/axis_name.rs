@@ -27,13 +27,16 @@ pub enum Axis {
     Instances,
     /// A look-alike instead of the part.
     LookAlikes,
+    /// As [`Self::Tilt`], by 0 to 35 degrees. The last variant, because an axis' position determines its random numbers.
+    Slant,
 }
 
 impl Axis {
     /// All axes, in reporting order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Height,
         Self::Tilt,
+        Self::Slant,
         Self::Covered,
         Self::Dark,
         Self::Blur,
@@ -48,6 +51,7 @@ impl Axis {
         match self {
             Self::Height => "height",
             Self::Tilt => "tilt",
+            Self::Slant => "slant",
             Self::Covered => "covered",
             Self::Dark => "dark",
             Self::Blur => "blur",

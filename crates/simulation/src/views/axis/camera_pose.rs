@@ -1,6 +1,7 @@
 //! Pictures from a higher, lower or tilted camera, with the part always completely in the picture.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::Rng;
@@ -14,10 +15,12 @@ use crate::views::shows_whole;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Heights of the camera relative to the usual one.
-const HEIGHT_FACTORS: std::ops::Range<f64> = 0.75..1.3;
+const HEIGHT_FACTORS: Range<f64> = 0.75..1.3;
 
-/// Range of the camera's tilt in degrees; a smaller tilt is an ordinary picture.
-const TILTS_DEG: std::ops::Range<f64> = 5.0..20.0;
+/// Tilts of the camera on the axis of tilts, in degrees; a smaller tilt is an ordinary picture.
+pub(super) const TILTS_DEG: Range<f64> = 5.0..20.0;
+/// Tilts of the camera on the axis of slants, in degrees.
+pub(super) const SLANTS_DEG: Range<f64> = 0.0..35.0;
 
 /// Largest distance between the part and the point at which a tilted camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.06;
@@ -52,10 +55,10 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
 }
 
 /// The picture of a tilted camera at the usual distance, aimed at the part or slightly beside it.
-pub(super) fn draw_tilted(request: &mut Request<'_>) -> Result<Drawn> {
+pub(super) fn draw_tilted(request: &mut Request<'_>, tilts_deg: Range<f64>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
-    let tilt_deg = request.between(TILTS_DEG);
+    let tilt_deg = request.between(tilts_deg);
     let distance_m = LOOK_HEIGHT_M;
     let part = part_in(&cell)?;
     let at = part.base_from_object.translation.vector;

@@ -64,7 +64,8 @@ pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Resul
     }
     let Drawn { mut cell, scene, view, parameter } = match axis {
         Axis::Height => camera_pose::draw_from_another_height(&mut request)?,
-        Axis::Tilt => camera_pose::draw_tilted(&mut request)?,
+        Axis::Tilt => camera_pose::draw_tilted(&mut request, camera_pose::TILTS_DEG)?,
+        Axis::Slant => camera_pose::draw_tilted(&mut request, camera_pose::SLANTS_DEG)?,
         Axis::Covered => cover::draw_covered(&mut request)?,
         Axis::Clutter => clutter::draw_cluttered(&mut request)?,
         Axis::Instances => instances::draw_three(&mut request)?,
@@ -149,7 +150,7 @@ mod tests {
             let spec = ObjectSpec::by_name(name).unwrap();
             let mut request = Request::new(&spec, axis, number, 5);
             let mut drawn = match axis {
-                Axis::Tilt => camera_pose::draw_tilted(&mut request).unwrap(),
+                Axis::Tilt => camera_pose::draw_tilted(&mut request, camera_pose::TILTS_DEG).unwrap(),
                 _ => camera_pose::draw_from_another_height(&mut request).unwrap(),
             };
             let truth = &visible::instance_truths(&mut drawn.cell, &drawn.scene, &drawn.view.camera).unwrap()[0];
