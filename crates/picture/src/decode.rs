@@ -133,10 +133,15 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
 /// Whether the picture has an Exif orientation that rotates or mirrors it; false for bytes that are not a picture.
 pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
     let Ok((format, _)) = format_of(bytes) else { return false };
-    if format == ImageFormat::Tiff && tiff::full_page(bytes).is_err() {
-        return false;
-    }
-    let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok();
+    let bytes = match format {
+        // `decode_image` reads this page, which need not be the first one.
+        ImageFormat::Tiff => match tiff::full_page(bytes) {
+            Ok(page) => page.bytes,
+            Err(_) => return false,
+        },
+        _ => Cow::Borrowed(bytes),
+    };
+    let decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().ok();
     let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
     orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
 }
