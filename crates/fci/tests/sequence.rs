@@ -254,6 +254,23 @@ fn the_server_takes_the_answer_to_its_present_state_alone() {
 }
 
 #[test]
+fn states_are_counted_only_while_a_client_is_connected() {
+    let server = serve();
+    // A hundred cycles.
+    thread::sleep(Duration::from_millis(100));
+    assert_eq!(server.statistics().num_states, 0);
+    let client = Client::in_motion(&server);
+    wait_until("a state is counted", || server.statistics().num_states > 0);
+    drop(client);
+    let num_states = || server.statistics().num_states;
+    wait_until("the count stands still", || {
+        let before = num_states();
+        thread::sleep(Duration::from_millis(100));
+        num_states() == before
+    });
+}
+
+#[test]
 fn a_position_that_is_no_number_stops_the_robot() {
     let server = serve();
     let client = Client::in_motion(&server);

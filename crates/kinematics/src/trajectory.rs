@@ -2,18 +2,17 @@
 //!
 //! - Point to point from rest: all joints move in proportion along a straight line in joint space, so the path does not
 //!   depend on the speed, and a clearance computed for it holds at any speed.
-//! - Point to point from a state in motion: each joint has its own profile, and all end at the same time (rsruckig).
 //! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom), stretched in
 //!   time by the smallest factor that keeps velocity, acceleration and jerk of every joint and of the tcp within their
 //!   limits.
 //! - Along a rounded path in joint space: nearly the fastest motion within all limits, including torques (timing/).
 
-use rsruckig::prelude::{InputParameter, Ruckig, Synchronization, ThrowErrorHandler};
+use rsruckig::prelude::{InputParameter, Ruckig, ThrowErrorHandler};
 
 use crate::check::check_joints;
 use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
-use crate::joints::{JointVector, NUM_JOINTS};
+use crate::joints::JointVector;
 use crate::limits::{CartesianLimits, JointLimits};
 use crate::path::{JointPath, PathPoint};
 use crate::rounded_path::RoundedPath;
@@ -24,7 +23,7 @@ use crate::timing::{self, MotionLimits, Timing};
 pub struct Trajectory {
     motion: Motion,
     duration_secs: f64,
-    start: State,
+    start: JointVector,
     end: JointVector,
 }
 
@@ -39,7 +38,6 @@ enum Motion {
         direction: JointVector,
         profile: Box<Profile>,
     },
-    EachJoint(Box<rsruckig::trajectory::Trajectory<NUM_JOINTS>>),
     AlongPath(Box<TimedPath>),
     AlongRoundedPath(Box<(RoundedPath, Timing)>),
 }
@@ -80,7 +78,7 @@ impl Trajectory {
         check_in_range("end", end, limits)?;
         let distance = (end - start).amax();
         if distance < MIN_DISTANCE_RAD {
-            return Ok(Self { motion: Motion::Still, duration_secs: 0.0, start: at_rest(start), end: *end });
+            return Ok(Self { motion: Motion::Still, duration_secs: 0.0, start: *start, end: *end });
         }
         // The joint that moves furthest has |direction| = 1. A joint that hardly moves gives no bound.
         let direction = (end - start) / distance;
@@ -95,59 +93,7 @@ impl Trajectory {
         Ok(Self {
             duration_secs: profile.duration(),
             motion: Motion::StraightInJointSpace { direction, profile: Box::new(profile) },
-            start: at_rest(start),
-            end: *end,
-        })
-    }
-
-    /// The fastest motion from a state in motion to rest at `end`. Each joint has its own profile, and all end at the
-    /// same time.
-    ///
-    /// # Units and frames
-    /// In rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
-    ///
-    /// # Errors
-    /// The errors of [`Trajectory::point_to_point`]; [`KinematicsError::JointOutOfRange`] also if the motion would
-    /// leave the position limits.
-    pub fn from_motion(
-        start: &JointVector,
-        start_velocity: &JointVector,
-        start_acceleration: &JointVector,
-        end: &JointVector,
-        limits: &JointLimits,
-    ) -> Result<Self, KinematicsError> {
-        check_in_range("start", start, limits)?;
-        check_in_range("end", end, limits)?;
-        check_joints("start_velocity", start_velocity)?;
-        check_joints("start_acceleration", start_acceleration)?;
-        let mut input = InputParameter::<NUM_JOINTS>::new(None);
-        input.synchronization = Synchronization::Time;
-        for joint_idx in 0..NUM_JOINTS {
-            input.current_position[joint_idx] = start[joint_idx];
-            input.current_velocity[joint_idx] = start_velocity[joint_idx];
-            input.current_acceleration[joint_idx] = start_acceleration[joint_idx];
-            input.target_position[joint_idx] = end[joint_idx];
-            input.max_velocity[joint_idx] = limits.velocity_max[joint_idx];
-            input.max_acceleration[joint_idx] = limits.acceleration_max[joint_idx];
-            input.max_jerk[joint_idx] = limits.jerk_max[joint_idx];
-        }
-        let mut profiles = calculate(&input)?;
-        for (joint_idx, extrema) in profiles.get_position_extrema().iter().enumerate() {
-            for found_rad in [extrema.min, extrema.max] {
-                let mut q = *start;
-                q[joint_idx] = found_rad;
-                if limits.margins(&q)[joint_idx] < -LIMIT_ROUNDING_RAD {
-                    return Err(KinematicsError::JointOutOfRange {
-                        what: "a point of the motion",
-                        violation: limits.violation_at(&q, joint_idx),
-                    });
-                }
-            }
-        }
-        Ok(Self {
-            duration_secs: profiles.duration,
-            motion: Motion::EachJoint(Box::new(profiles)),
-            start: (*start, *start_velocity, *start_acceleration),
+            start: *start,
             end: *end,
         })
     }
@@ -183,7 +129,7 @@ impl Trajectory {
         let (profile, stretch) = best.expect("there is at least one cruising speed");
         Ok(Self {
             duration_secs: profile.duration() * stretch,
-            start: at_rest(path.start()),
+            start: *path.start(),
             end: *path.end(),
             motion: Motion::AlongPath(Box::new(TimedPath { path, profile, stretch })),
         })
@@ -208,7 +154,7 @@ impl Trajectory {
         let timing = timing::time(&path, &limits)?;
         Ok(Self {
             duration_secs: timing.profile.duration_secs() * timing.stretch,
-            start: at_rest(path.start()),
+            start: *path.start(),
             end: *path.end(),
             motion: Motion::AlongRoundedPath(Box::new((path, timing))),
         })
@@ -230,7 +176,7 @@ impl Trajectory {
 
     /// The start of the motion.
     pub fn start(&self) -> &JointVector {
-        &self.start.0
+        &self.start
     }
 
     /// The end of the motion.
@@ -240,26 +186,20 @@ impl Trajectory {
 
     /// Joint positions (rad), velocities (rad/s) and accelerations (rad/s²) at `time_secs`.
     ///
-    /// Before the start the arm is in its start state, after the end it is at rest. A time that is NaN counts as the
-    /// start.
+    /// Before the start and after the end the arm is at rest. A time that is NaN counts as the start.
     pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
         if time_secs.is_nan() || time_secs <= 0.0 {
-            return self.start;
+            return at_rest(&self.start);
         }
         if time_secs >= self.duration_secs {
             return at_rest(&self.end);
         }
         match &self.motion {
-            Motion::Still => self.start,
+            Motion::Still => at_rest(&self.start),
             Motion::StraightInJointSpace { direction, profile } => {
                 let progress = profile.at(time_secs);
-                (
-                    self.start.0 + direction * progress.s,
-                    direction * progress.velocity,
-                    direction * progress.acceleration,
-                )
+                (self.start + direction * progress.s, direction * progress.velocity, direction * progress.acceleration)
             }
-            Motion::EachJoint(profiles) => sample_profiles(profiles, time_secs),
             Motion::AlongPath(timed) => {
                 let Progress { s, velocity, acceleration, .. } = timed.profile.at(time_secs / timed.stretch);
                 at_progress(&timed.path.at(s), velocity, acceleration, timed.stretch)
@@ -311,20 +251,6 @@ fn calculate<const DOF: usize>(
         .calculate(input, &mut trajectory)
         .map_err(|error| KinematicsError::Trajectory { reason: error.to_string() })?;
     Ok(trajectory)
-}
-
-fn sample_profiles(
-    profiles: &rsruckig::trajectory::Trajectory<NUM_JOINTS>,
-    time_secs: f64,
-) -> (JointVector, JointVector, JointVector) {
-    let mut q = JointVector::zeros();
-    let mut qd = JointVector::zeros();
-    let mut qdd = JointVector::zeros();
-    profiles.state_to_integrate_from(time_secs, &mut 0, |joint_idx, t, position, velocity, acceleration, jerk| {
-        let (p, v, a) = rsruckig::util::integrate(t, position, velocity, acceleration, jerk);
-        (q[joint_idx], qd[joint_idx], qdd[joint_idx]) = (p, v, a);
-    });
-    (q, qd, qdd)
 }
 
 impl Profile {

@@ -78,13 +78,12 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 ///
 /// # Errors
 /// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
-/// file, zero width or height, more than `limits.max_pixels` (PPM: more than 64 megapixels, a side above 16384 pixels
-/// or values above 255), a TIFF with several full-size pages, raw data or a palette that has not 8 bits, or a CMYK JPEG
-/// for which it is unknown whether the inks are inverted.
+/// file, zero width or height, more than `limits.max_pixels` (PPM: also more than 64 megapixels, a side above 16384
+/// pixels or values above 255), a TIFF with several full-size pages, raw data or a palette that has not 8 bits, or a
+/// CMYK JPEG for which it is unknown whether the inks are inverted.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
-        let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
-        return ppm::decode_ppm(bytes).map_err(damaged);
+        return ppm::decode_ppm(bytes, |width, height| check_size(width, height, limits));
     }
     let (format, name) = format_of(bytes)?;
     let damaged = |error: image::ImageError| PictureError::DamagedImage { format: name, reason: error.to_string() };
@@ -134,10 +133,15 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
 /// Whether the picture has an Exif orientation that rotates or mirrors it; false for bytes that are not a picture.
 pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
     let Ok((format, _)) = format_of(bytes) else { return false };
-    if format == ImageFormat::Tiff && tiff::full_page(bytes).is_err() {
-        return false;
-    }
-    let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok();
+    let bytes = match format {
+        // `decode_image` reads this page, which need not be the first one.
+        ImageFormat::Tiff => match tiff::full_page(bytes) {
+            Ok(page) => page.bytes,
+            Err(_) => return false,
+        },
+        _ => Cow::Borrowed(bytes),
+    };
+    let decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().ok();
     let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
     orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
 }
@@ -299,8 +303,15 @@ mod tests {
         let found = decode(&png_header(60_000, 60_000)).unwrap_err();
         assert_eq!(found, PictureError::EnormousImage { width: 60_000, height: 60_000, max_pixels: 210_000_000 });
         assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
-        let small = ImageLimits { max_pixels: 40 * 24 - 1 };
-        assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
+        let ppm = [b"P6 40 24 255\n".as_slice(), gradient().to_rgb8().as_raw()].concat();
+        let files = FORMATS.iter().map(|(format, _)| encode(&gradient(), *format)).chain([ppm]);
+        let limits = [40 * 24, 40 * 24 - 1].map(|max_pixels| ImageLimits { max_pixels });
+        for (idx, file) in files.enumerate() {
+            let [whole, refused] = limits.map(|limits| decode_image(&file, &limits));
+            assert!(whole.is_ok(), "file {idx}");
+            let enormous = PictureError::EnormousImage { width: 40, height: 24, max_pixels: 40 * 24 - 1 };
+            assert_eq!(refused, Err(enormous), "file {idx}");
+        }
         // A JPEG without its end marker: the check of its data would decode the picture, so its size is checked first.
         let mut jpeg = encode(&gradient(), ImageFormat::Jpeg);
         jpeg.truncate(jpeg.len() - 2);

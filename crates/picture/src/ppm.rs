@@ -2,6 +2,8 @@
 
 use image::RgbImage;
 
+use crate::error::PictureError;
+
 /// Maximum number of pixels: 64 megapixels, 192 MiB.
 const MAX_PIXELS: u64 = 1 << 26;
 /// Maximum width and height.
@@ -71,13 +73,18 @@ impl PpmHead {
     }
 }
 
-/// Decodes the picture at the beginning of the bytes.
+/// Decodes the picture at the beginning of the bytes, after `check_size` has accepted its width and height.
 ///
 /// # Errors
-/// A text that describes the data found in place of a complete picture.
-pub(crate) fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
-    let short = || format!("a PPM that ends after {} bytes", bytes.len());
-    let head = PpmHead::read(bytes)?.ok_or_else(short)?;
+/// Data in place of a complete picture, and the errors of `check_size`.
+pub(crate) fn decode_ppm(
+    bytes: &[u8],
+    check_size: impl FnOnce(u32, u32) -> Result<(), PictureError>,
+) -> Result<RgbImage, PictureError> {
+    let damaged = |found: String| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
+    let short = || damaged(format!("a PPM that ends after {} bytes", bytes.len()));
+    let head = PpmHead::read(bytes).map_err(damaged)?.ok_or_else(short)?;
+    check_size(head.width, head.height)?;
     let pixels = bytes.get(head.start..head.end()).ok_or_else(short)?;
     RgbImage::from_raw(head.width, head.height, pixels.to_vec()).ok_or_else(short)
 }
@@ -88,7 +95,8 @@ mod tests {
 
     #[test]
     fn ppm_heads_have_comments_and_bounds() {
-        let picture = decode_ppm(b"P6 # two\n# pixels\n2 1\n255\n\x01\x02\x03\x04\x05\x06").unwrap();
+        let decode = |bytes: &[u8]| decode_ppm(bytes, |_, _| Ok(()));
+        let picture = decode(b"P6 # two\n# pixels\n2 1\n255\n\x01\x02\x03\x04\x05\x06").unwrap();
         assert_eq!((picture.dimensions(), picture.as_raw().as_slice()), ((2, 1), [1, 2, 3, 4, 5, 6].as_slice()));
         for (bytes, expected) in [
             (b"P6 2 1 255\n\x01\x02\x03".as_slice(), "ends after 14 bytes"),
@@ -99,7 +107,7 @@ mod tests {
             (b"P6 -2 1 255\n", "in place of a number"),
             (b"P6 2", "ends after 4 bytes"),
         ] {
-            let error = decode_ppm(bytes).unwrap_err();
+            let error = decode(bytes).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

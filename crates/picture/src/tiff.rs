@@ -264,6 +264,8 @@ mod tests {
     use super::*;
     use crate::{ImageLimits, decode_image};
 
+    const ORIENTATION: u16 = 274;
+
     /// A page of a test TIFF: size, bits and photometric interpretation, samples, further tags with values of 16 bits.
     struct TestPage {
         size: [u16; 2],
@@ -361,6 +363,23 @@ mod tests {
         }
         // A thumbnail alone is used.
         assert_eq!(decoded(&file(&[rgb([4, 3], [9, 9, 9], 1)], false)).unwrap().dimensions(), (4, 3));
+    }
+
+    #[test]
+    fn the_orientation_is_that_of_the_page_in_full_size() {
+        // Orientation 6: rotate by 90° clockwise for viewing.
+        let turned = |mut page: TestPage| {
+            page.tags.push((ORIENTATION, vec![6]));
+            page
+        };
+        let [small, large] = [|| rgb([4, 3], [9, 9, 9], 1), || rgb([8, 6], [10, 20, 30], 0)];
+        for is_big in [false, true] {
+            for (pages, size) in [([small(), turned(large())], (6, 8)), ([turned(small()), large()], (8, 6))] {
+                let bytes = file(&pages, is_big);
+                assert_eq!(decoded(&bytes).unwrap().dimensions(), size);
+                assert_eq!(crate::is_turned_by_exif(&bytes), size == (6, 8));
+            }
+        }
     }
 
     #[test]

@@ -85,5 +85,28 @@ impl RobotError {
     }
 }
 
+/// Checks that a setting is above 0 and at most `max`.
+///
+/// # Errors
+/// [`RobotError::Configuration`].
+pub(crate) fn check_positive(what: &str, found: f64, max: f64) -> Result<()> {
+    check(found > 0.0 && found <= max, what, format!("above 0 and at most {max}"), found)
+}
+
+/// Checks that a setting is from 0 to `max`.
+///
+/// # Errors
+/// [`RobotError::Configuration`].
+pub(crate) fn check_not_negative(what: &str, found: f64, max: f64) -> Result<()> {
+    check((0.0..=max).contains(&found), what, format!("0 to {max}"), found)
+}
+
+fn check(is_valid: bool, what: &str, expected: String, found: f64) -> Result<()> {
+    match is_valid {
+        true => Ok(()),
+        false => Err(RobotError::Configuration { what: what.to_owned(), expected, found: found.to_string() }),
+    }
+}
+
 /// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, RobotError>;

@@ -20,6 +20,7 @@ use nalgebra::{Isometry3, SMatrix, Vector6};
 use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm_state::PERIOD_SECS;
+use crate::error::{Result, check_not_negative, check_positive};
 
 /// Keeps the pseudoinverse bounded near singular poses.
 const DAMPING: f64 = 1e-2;
@@ -66,6 +67,42 @@ impl Impedance {
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
+}
+
+impl Impedance {
+    /// Checks that every value is finite, of the right sign and not above its maximum. `when` completes the names in
+    /// the error.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`](crate::RobotError::Configuration).
+    pub(crate) fn validate(&self, when: &str) -> Result<()> {
+        /// Along and about each direction, N/m and N·m/rad. A reference 15 mm ahead of the tcp then presses with 15 N.
+        const MAX_STIFFNESS: [f64; 2] = [1000.0, 100.0];
+        /// The mass of an arm, kg, and as many kg·m².
+        const MAX_MASS: f64 = 20.0;
+        const MAX_INTEGRAL_PER_SEC: f64 = 10.0;
+        const MAX_NULL_STIFFNESS: f64 = 100.0;
+        /// The robot stops above this.
+        const MAX_TORQUE_STEP_NM: f64 = 1.0;
+        for idx in 0..6 {
+            let is_turn = idx >= 3;
+            let axis = format!("{} {}", if is_turn { "about" } else { "along" }, ["x", "y", "z"][idx % 3]);
+            let [stiffness_unit, mass_unit] = if is_turn { ["N·m/rad", "kg·m²"] } else { ["N/m", "kg"] };
+            let max_stiffness = MAX_STIFFNESS[usize::from(is_turn)];
+            check_positive(
+                &format!("stiffness {axis} {when} in {stiffness_unit}"),
+                self.stiffness[idx],
+                max_stiffness,
+            )?;
+            check_positive(&format!("mass {axis} {when} in {mass_unit}"), self.mass[idx], MAX_MASS)?;
+            let integral = self.integral_per_sec[idx];
+            check_not_negative(&format!("integral {axis} {when} in 1/s"), integral, MAX_INTEGRAL_PER_SEC)?;
+        }
+        let elbow = format!("stiffness of the elbow {when} in N·m/rad");
+        check_not_negative(&elbow, self.null_stiffness, MAX_NULL_STIFFNESS)?;
+        let step = format!("change of torque per cycle {when} in N·m");
+        check_positive(&step, self.max_torque_step_nm, MAX_TORQUE_STEP_NM)
+    }
 }
 
 /// The desired state of the tcp.

@@ -279,8 +279,8 @@ impl<A: CompliantArm> Robot<'_, A> {
     /// checked first, with table and workspace lowered by [`TouchDown::below_table_m`].
     ///
     /// # Errors
-    /// As for [`Robot::follow`]; [`RobotError::Configuration`] for a speed or a force that is not suitable for
-    /// contact; [`RobotError::Planning`] if there is no straight path.
+    /// As for [`Robot::follow`]; [`RobotError::Configuration`] for a setting of `touch_down` that is outside its
+    /// range; [`RobotError::Planning`] if there is no straight path.
     pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
         touch_down.validate()?;
         let start = self.ready()?.q_commanded;

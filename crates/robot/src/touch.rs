@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Vector6};
 use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm_state::PERIOD_SECS;
-use crate::error::{Result, RobotError};
+use crate::error::{Result, check_not_negative, check_positive};
 use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 
 /// Time during which the arm stands still to measure the forces in free air, and over which force and height are
@@ -64,28 +64,25 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
-    /// Checks speed, length, forces and time.
+    /// Checks every setting.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`].
+    /// [`RobotError::Configuration`](crate::RobotError::Configuration).
     pub(crate) fn validate(&self) -> Result<()> {
         /// Maximum speed: at higher speeds a contact is an impact.
         const MAX_SPEED_M_S: f64 = 0.05;
         const MAX_WAY_M: f64 = 0.2;
+        /// Maximum uncertainty of the table's height; the check against the table is weaker by this distance.
+        const MAX_BELOW_TABLE_M: f64 = 0.05;
         const MAX_FORCE_N: f64 = 15.0;
-        for (what, found, max) in [
-            ("speed of the descent in m/s", self.speed_m_s, MAX_SPEED_M_S),
-            ("length of the descent in m", self.max_way_m, MAX_WAY_M),
-            ("force of a contact in N", self.contact_n, MAX_FORCE_N),
-            ("force of pressing in N", self.press_n, MAX_FORCE_N),
-            ("time of pressing in s", self.press_secs, 10.0),
-        ] {
-            if !(found > 0.0 && found <= max) {
-                let expected = format!("above 0 and at most {max}");
-                return Err(RobotError::Configuration { what: what.to_owned(), expected, found: found.to_string() });
-            }
-        }
-        Ok(())
+        check_positive("speed of the descent in m/s", self.speed_m_s, MAX_SPEED_M_S)?;
+        check_positive("length of the descent in m", self.max_way_m, MAX_WAY_M)?;
+        check_not_negative("distance below the table in m", self.below_table_m, MAX_BELOW_TABLE_M)?;
+        check_positive("force of a contact in N", self.contact_n, MAX_FORCE_N)?;
+        check_positive("force of pressing in N", self.press_n, MAX_FORCE_N)?;
+        check_positive("time of pressing in s", self.press_secs, 10.0)?;
+        self.free_air.validate("in free air")?;
+        self.contact.validate("after the contact")
     }
 }
 
@@ -289,6 +286,47 @@ mod tests {
             let touched = descend(touch_down, |spring_n| spring_n);
             assert!(touched.is_contact && (touched.force_n - press_n).abs() < 0.05 * press_n, "{touched:?}");
             assert!(touched.peak_n < 1.5 * press_n.max(touch_down.contact_n), "{touched:?}");
+        }
+    }
+
+    /// A table height lowered by NaN would never be violated, and a negative stiffness pushes away from the reference.
+    #[test]
+    fn each_setting_out_of_its_range_is_named() {
+        type Change = fn(&mut TouchDown, f64);
+        let settings: [(&str, Change, &[f64]); 7] = [
+            ("distance below the table in m", |it, value| it.below_table_m = value, &[0.051, -0.001]),
+            ("stiffness along z in free air in N/m", |it, value| it.free_air.stiffness.z = value, &[1001.0, 0.0, -1.0]),
+            (
+                "stiffness about x after the contact in N·m/rad",
+                |it, value| it.contact.stiffness.w = value,
+                &[101.0, 0.0],
+            ),
+            ("mass along y in free air in kg", |it, value| it.free_air.mass.y = value, &[21.0, 0.0, -1.0]),
+            (
+                "integral about z after the contact in 1/s",
+                |it, value| it.contact.integral_per_sec.b = value,
+                &[11.0, -1.0],
+            ),
+            (
+                "stiffness of the elbow in free air in N·m/rad",
+                |it, value| it.free_air.null_stiffness = value,
+                &[101.0, -1.0],
+            ),
+            (
+                "change of torque per cycle after the contact in N·m",
+                |it, value| it.contact.max_torque_step_nm = value,
+                &[1.1, 0.0],
+            ),
+        ];
+        TouchDown { below_table_m: 0.0, free_air: Impedance::SOFT, ..TouchDown::default() }.validate().unwrap();
+        for (name, change, wrong) in settings {
+            for value in wrong.iter().copied().chain([f64::NAN, f64::INFINITY]) {
+                let mut touch_down = TouchDown::default();
+                change(&mut touch_down, value);
+                let found = touch_down.validate().unwrap_err().to_string();
+                assert!(found.starts_with(&format!("{name}: expected ")), "{found}");
+                assert!(found.ends_with(&format!("found {value}")), "{found}");
+            }
         }
     }
 

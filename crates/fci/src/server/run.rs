@@ -206,11 +206,11 @@ impl Loop {
         }
         if self.robot_link.is_open() {
             self.robot_link.send_state(&self.robot.state(self.plant.as_ref()).encode(VERSION));
+            self.statistics.num_states += 1;
         }
         if self.hand_link.is_open() && self.robot.time_ms().is_multiple_of(HAND_STATE_CYCLES) {
             self.hand_link.send_state(&self.hand.state(self.plant.as_ref()).encode());
         }
-        self.statistics.num_states += 1;
         *self.shared.statistics.lock().unwrap_or_else(PoisonError::into_inner) = self.statistics;
     }
 

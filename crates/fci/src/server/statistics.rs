@@ -8,7 +8,7 @@ pub const STALL: Duration = Duration::from_millis(20);
 /// Counts since the server started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ServerStatistics {
-    /// Number of states, one for each cycle; a state is sent only if a client is connected.
+    /// Number of states that were sent to clients, one for each cycle with a connected client.
     pub num_states: u64,
     /// Number of cycles within motions, from the first command of each motion on.
     pub num_motion_cycles: u64,

@@ -100,9 +100,11 @@ impl CheckedMotion {
     }
 }
 
-/// Relative tolerance, for the robot's own velocity limits in rad/s: planned motions reach their limits exactly, and
-/// rounding and differences over a cycle exceed them slightly.
+/// Tolerance as a fraction of a limit: planned motions reach their limits exactly, and rounding and differences over a
+/// cycle exceed them slightly.
 const ROUNDING: f64 = 1e-3;
+/// Tolerance of positions, rad, and of velocities where the limit is 0, rad/s.
+const JOINT_ROUNDING: f64 = 1e-6;
 
 impl SafetyLimits {
     /// Checks a whole motion.
@@ -151,14 +153,15 @@ impl SafetyLimits {
             ] {
                 let (found, max) = (value[idx], max[idx]);
                 let min = if quantity == "position" { min[idx] } else { -max };
-                let rounding = if quantity == "position" { 1e-6 } else { ROUNDING * max };
+                let rounding = if quantity == "position" { JOINT_ROUNDING } else { ROUNDING * max };
                 if found < min - rounding || found > max + rounding {
                     return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
                 }
             }
             let Some(robot) = self.robot else { continue };
             let [min, max] = robot.velocity_range(idx, q[idx]);
-            if dq[idx] < min - ROUNDING || dq[idx] > max + ROUNDING {
+            let [below, above] = [min, max].map(|limit| (ROUNDING * limit.abs()).max(JOINT_ROUNDING));
+            if dq[idx] < min - below || dq[idx] > max + above {
                 let (quantity, found, unit) = ("velocity", dq[idx], "rad/s");
                 return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
             }

@@ -2,12 +2,11 @@
 
 use ros2_client::RmwRequestId;
 use ros2_client::action::{GetResultResponse, GoalId, GoalStatusEnum, SendGoalResponse};
-use ros2_client::action_msgs::{
-    CancelGoalResponse, CancelGoalResponseEnum, GoalInfo, GoalStatus as StatusMessage, GoalStatusArray,
-};
+use ros2_client::action_msgs::{GoalInfo, GoalStatus as StatusMessage, GoalStatusArray};
 use ros2_client::builtin_interfaces::Time;
 
 use super::action::GoalEnd;
+use super::cancellation;
 use super::failure::network;
 use super::wire::Wire;
 use crate::cdr::Cdr;
@@ -35,7 +34,8 @@ where
 {
     name: String,
     inner: ros2_client::dds::ActionServer<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
-    running: Option<GoalId>,
+    /// The running goal, with the time of its acceptance.
+    running: Option<GoalInfo>,
     ended: Vec<(GoalId, GoalEnd, R)>,
     waiting: Vec<(GoalId, RmwRequestId)>,
 }
@@ -61,28 +61,27 @@ where
     pub fn asked(&mut self, accepts: impl Fn(&G) -> bool) -> Result<Option<Asked<G>>, RosError> {
         self.answer_results()?;
         let failed = |error: ros2_client::ReadError| network(&self.name, error);
-        if let Some((request, _)) = self.inner.receive_cancel_request().map_err(failed)? {
-            let canceling: Vec<GoalInfo> =
-                self.running.iter().map(|goal| GoalInfo { goal_id: *goal, stamp: Time::ZERO }).collect();
-            let return_code = match canceling.is_empty() {
-                true => CancelGoalResponseEnum::Rejected,
-                false => CancelGoalResponseEnum::None,
-            };
-            let response = CancelGoalResponse { return_code, goals_canceling: canceling };
+        if let Some((request, asked)) = self.inner.receive_cancel_request().map_err(failed)? {
+            let named = cancellation::named_in(&asked).map_err(|error| network(&self.name, error))?;
+            let ended: Vec<GoalId> = self.ended.iter().map(|(goal, ..)| *goal).collect();
+            let response = cancellation::answer(&named, self.running.as_ref(), &ended);
+            let is_cancelled = !response.goals_canceling.is_empty();
             self.inner.send_cancel_response(request, response).map_err(|error| network(&self.name, error))?;
-            return Ok(self.running.map(|_| Asked::Cancel));
+            return Ok(is_cancelled.then_some(Asked::Cancel));
         }
         let Some((request, message)) = self.inner.receive_goal().map_err(failed)? else { return Ok(None) };
         let Wire(goal) = message.goal;
         let goal = goal.ok().filter(|goal| accepts(goal));
-        let response = SendGoalResponse { accepted: goal.is_some(), stamp: Time::ZERO };
+        let stamp = Time::now();
+        let response = SendGoalResponse { accepted: goal.is_some(), stamp };
         self.inner.send_goal_response(request, response).map_err(|error| network(&self.name, error))?;
         let Some(goal) = goal else { return Ok(None) };
         if self.running.is_some() {
             self.end(GoalEnd::Aborted, R::default())?;
         }
-        self.running = Some(message.goal_id);
-        self.tell(message.goal_id, GoalStatusEnum::Executing)?;
+        let accepted = GoalInfo { goal_id: message.goal_id, stamp };
+        self.running = Some(accepted.clone());
+        self.tell(accepted, GoalStatusEnum::Executing)?;
         Ok(Some(Asked::Goal(goal)))
     }
 
@@ -91,8 +90,10 @@ where
     /// # Errors
     /// Errors reported by the network.
     pub fn feedback(&self, feedback: F) -> Result<(), RosError> {
-        let Some(goal) = self.running else { return Ok(()) };
-        self.inner.send_feedback(goal, Wire(Ok(feedback))).map_err(|error| network(&self.name, error.forget_data()))
+        let Some(goal) = &self.running else { return Ok(()) };
+        self.inner
+            .send_feedback(goal.goal_id, Wire(Ok(feedback)))
+            .map_err(|error| network(&self.name, error.forget_data()))
     }
 
     /// Ends the running goal.
@@ -104,7 +105,7 @@ where
         if self.ended.len() >= MAX_ENDED {
             self.ended.remove(0);
         }
-        self.ended.push((goal, end, result));
+        self.ended.push((goal.goal_id, end, result));
         self.tell(goal, status(end))?;
         self.answer_results()
     }
@@ -120,7 +121,7 @@ where
             let ended = self.ended.iter().find(|(ended, ..)| *ended == goal);
             let (end, result) = match ended {
                 Some((_, end, result)) => (*end, result.clone()),
-                None if self.running == Some(goal) => {
+                None if self.running.as_ref().is_some_and(|running| running.goal_id == goal) => {
                     self.waiting.push((goal, request));
                     continue;
                 }
@@ -132,8 +133,7 @@ where
         Ok(())
     }
 
-    fn tell(&self, goal: GoalId, status: GoalStatusEnum) -> Result<(), RosError> {
-        let goal_info = GoalInfo { goal_id: goal, stamp: Time::ZERO };
+    fn tell(&self, goal_info: GoalInfo, status: GoalStatusEnum) -> Result<(), RosError> {
         let statuses = GoalStatusArray { status_list: vec![StatusMessage { goal_info, status }] };
         self.inner.send_goal_statuses(statuses).map_err(|error| network(&self.name, error.forget_data()))
     }

@@ -6,6 +6,7 @@ mod action;
 mod action_server;
 mod arm;
 mod camera;
+mod cancellation;
 mod failure;
 mod joint_states;
 mod node;

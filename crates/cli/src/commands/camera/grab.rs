@@ -77,7 +77,8 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         bail!("{}: expected a frame, found none", args.live.from);
     }
     if num_written < args.count {
-        eprintln!("sdg: {} of {} frames; the source has no more", num_written, args.count);
+        let why = if interrupt.is_requested() { "interrupted" } else { "the source has no more" };
+        eprintln!("sdg: {num_written} of {} frames; {why}", args.count);
     }
     Ok(Outcome::Done)
 }

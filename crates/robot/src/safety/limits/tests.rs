@@ -143,6 +143,30 @@ fn an_fr3_may_not_do_all_that_a_panda_may() {
     assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
 }
 
+/// The tolerance is a fraction of the limit, also near the end of a joint's range, where an FR3's limit is low.
+#[test]
+fn a_low_velocity_limit_has_a_low_tolerance() {
+    let (limits, still) = (SafetyLimits::fr3(), JointVector::zeros());
+    let robot = limits.robot.unwrap();
+    let check = |q_1, dq_1| {
+        let mut q = limits.geometry.ready;
+        q[0] = q_1;
+        let dq = JointVector::from([dq_1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        limits.check_joints(0.0, (&q, &dq, &still), &Derivatives::default())
+    };
+    // sqrt(12 * 0.0078) - 0.3 rad/s.
+    let near_end = robot.q_max[0] - 0.0078;
+    let max = robot.velocity_range(0, near_end)[1];
+    assert!((max - 0.005941).abs() < 1e-6, "{max}");
+    check(near_end, 1.0005 * max).unwrap();
+    let refused = check(near_end, 1.1 * max).unwrap_err();
+    assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, .. }), "{refused}");
+    // At the end the limit is 0: only rounding is allowed.
+    check(robot.q_max[0], 1e-9).unwrap();
+    assert!(check(robot.q_max[0], 1e-5).is_err());
+    assert!(check(robot.q_min[0], -1e-5).is_err());
+}
+
 /// The limits of an arm's geometry are those that the robot applies to its client, except for a lower speed of the tcp.
 #[test]
 fn geometry_and_protocol_have_the_same_limits() {
