@@ -41,8 +41,8 @@ pub struct TeachArgs {
     /// several views
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
-    /// Teach many parts: a folder of photos with marks beside them, each of one part, and of folders with several
-    /// photos of one part. --out is then a folder for the models and a page that lists similar parts and parts that
+    /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out is
+    /// then a folder for the models and a page that lists similar parts and parts that
     /// need another photo. Existing models are kept. Lines "NAME 4" or "NAME full" in its symmetries.txt give a part's
     /// --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
@@ -90,11 +90,12 @@ pub struct TeachArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
     /// Initial weights: base weights made by `make base-weights`, any file that `sdg weights convert` reads or writes,
-    /// a grasp model, or none for random initialisation; default: preset edge starts from the base weights included in
+    /// a grasp model, or "none" (random initialisation); default: preset edge starts from the base weights included in
     /// this program
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
-    /// Initialise this part randomly in spite of --base-weights, such as roi_heads.box_predictor; repeat for several
+    /// Initialise parameters with this prefix randomly in spite of --base-weights, such as roi_heads.box_predictor;
+    /// repeat for several
     #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
     pub reinitialized: Vec<String>,
     /// Folder for a page on the teaching: photo and marks, samples, curves
