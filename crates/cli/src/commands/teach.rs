@@ -42,9 +42,8 @@ pub struct TeachArgs {
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
     /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out is
-    /// then a folder for the models and a page that lists similar parts and parts that
-    /// need another photo. Existing models are kept. Lines "NAME 4" or "NAME full" in its symmetries.txt give a part's
-    /// --symmetry
+    /// then a folder for the models and a page that lists similar parts and parts that need another photo. Existing
+    /// models are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a part's --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
     /// Teach only this part of --demos, without the page, so that several machines can each teach some of the parts;
@@ -74,8 +73,8 @@ pub struct TeachArgs {
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
     /// Smallest and largest size of the part in a picture, relative to its size in the photo: 0.95-1.05 if the camera's
-    /// height is constant, which also distinguishes parts of different sizes; a wider range if it is not, or if the
-    /// photo was both cropped and resized
+    /// height is constant, which also distinguishes parts of different sizes; a wider range if the height varies, or if
+    /// the photo was both cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts
