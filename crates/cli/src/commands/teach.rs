@@ -51,8 +51,8 @@ pub struct TeachArgs {
     #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
-    /// calibrated so that nothing is accepted in it, as long as nine in ten parts are still accepted; repeat for
-    /// several
+    /// calibrated so that nothing is accepted in it, as long as nine in ten parts in held-out samples are still
+    /// accepted; repeat for several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write

@@ -148,7 +148,7 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub search_points: Option<u32>,
-    /// The --out folder of another run with --axes, to compare with on the same pictures
+    /// The --out folder of another run with --axes; the results on the same pictures are compared
     #[arg(long, value_name = "DIR", requires = "axes", help_heading = AXES)]
     pub against: Option<PathBuf>,
     /// Network, training and augmentation
