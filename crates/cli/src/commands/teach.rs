@@ -41,8 +41,8 @@ pub struct TeachArgs {
     /// several views
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
-    /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out is
-    /// then a folder for the models and a page that lists similar parts and parts that need another photo. Existing
+    /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out
+    /// is then a folder for the models and a page that lists similar parts and parts that need another photo. Existing
     /// models are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a part's --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
