@@ -1,4 +1,4 @@
-//! Errors, each with the expected and the found value.
+//! Errors, most with the expected and the found value.
 
 use std::io;
 use std::path::PathBuf;
@@ -49,7 +49,7 @@ pub enum Error {
     Project { path: PathBuf, found: String },
     /// The file of the page's token contains no such token.
     #[error(
-        "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",
+        "{}: expected a token of at least 16 letters or digits, found {found} characters (delete the file to renew it)",
         path.display()
     )]
     NotAKey {

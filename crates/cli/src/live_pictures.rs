@@ -10,9 +10,9 @@ use crate::exit::Usage;
 #[derive(Debug, Args)]
 pub struct LiveArgs {
     /// The camera: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH,
-    /// sim: or ros2:TOPIC
+    /// sim: or ros2:TOPIC.
     ///
-    /// Folders and files take options after a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
+    /// Folders and files take options after a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow
     #[arg(long, value_name = "ADDRESS")]
     pub from: Address,
     /// Settings of the camera

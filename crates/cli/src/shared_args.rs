@@ -45,7 +45,7 @@ pub struct ToldHeightArgs {
     /// they contradict each other
     #[arg(long, value_name = "MM", value_parser = height_mm)]
     pub mark_height_mm: Option<f64>,
-    /// Standard deviation of that height
+    /// Standard deviation of --mark-height-mm
     #[arg(long, value_name = "MM", value_parser = sigma_mm, default_value_t = 1.0, requires = "mark_height_mm")]
     pub mark_height_sigma_mm: f64,
 }
@@ -61,8 +61,8 @@ impl ToldHeightArgs {
 /// Properties of the user's own part that the photo does not show.
 #[derive(Debug, Clone, ClapArgs)]
 pub struct OwnPartArgs {
-    /// Height of your own part above the table, to rehearse the part that the model was taught from, with its outline
-    /// and photo, instead of --object; not needed for a model taught with --camera
+    /// Height of the taught part above the table: rehearses this part, with its outline and photo, instead of --object;
+    /// not needed for a model taught with --camera
     #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub height_mm: Option<f64>,
     /// Length of the longer side of the part's box; not needed for a model taught with --camera

@@ -123,8 +123,7 @@ fn catmull_rom(t: f64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Cosines for a given offset: they decrease with the distance of each shift from the offset's position for the
-    /// cell.
+    /// Cosines that are largest at the shift that `offset` gives the cell, and decrease away from it.
     fn cosines(offset: &PlanarSimilarity, map_px: usize, reach: usize) -> Vec<f32> {
         let (middle, side) = (0.5 * (map_px as f64 - 1.0), 2 * reach + 1);
         let at = |shift: usize, cell: usize| {

@@ -38,7 +38,7 @@ pub(crate) const SHIPPED_SHA256: &str = include_str!("../weights/edge.sha256");
 pub struct BaseWeightsFile {
     /// The preset to which the weights belong.
     pub preset: String,
-    /// Parameters that teaching initialises randomly, since they belong to another part.
+    /// Parameters that teaching initialises randomly, such as predictors of other classes.
     pub reinitialized: BTreeSet<String>,
     /// Values by the parameters' names.
     pub parameters: StateDict,
@@ -102,7 +102,7 @@ impl BaseWeightsFile {
     /// The weights for a network; heads that the network lacks are left out. `sha256` is the hash of the file.
     ///
     /// # Errors
-    /// [`GraspError::BaseWeights`] for weights of another preset, and a configuration that contradicts itself.
+    /// [`GraspError::BaseWeights`] for another preset, [`GraspError::Detection`] for an invalid configuration.
     pub fn for_network(&self, preset: &str, network: &RcnnConfig, sha256: String) -> Result<BaseWeights> {
         if self.preset != preset {
             return Err(refused(&format!("weights for preset {} instead of {preset}", self.preset)));

@@ -1,10 +1,10 @@
 //! Settings of the comparison of a demonstration with images, with the origin of each value.
 //!
-//! The fitted values are in this file, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
+//! The fitted values are fields, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
 //! fit_constants` fits them on generated parts. docs/decisions/010-constants.md lists these and all other constants of
-//! this crate with their origin. "The simulator's pictures" below are 60 pictures of each of the eight shipped parts
-//! and 60 without it (seeds from 50000), two starts per picture with errors of up to 12 px, 9° and 9 %; the program
-//! that fitted on them was not kept.
+//! this crate with their origin. "The simulator's pictures" below are 60 pictures of each of the paper's eight parts
+//! and 60 without it (seeds from 50000), with two starts per picture that have errors of up to 12 px, 9° and 9 %. The
+//! program that fitted on them was not kept.
 
 use std::f64::consts::PI;
 
@@ -29,7 +29,7 @@ pub struct ShapeConfig {
     pub gradient: GradientConfig,
     /// How colours inside the outline are compared.
     pub surface: SurfaceConfig,
-    /// How edge directions are compared in both directions.
+    /// How edges missing in photo or picture are counted.
     pub structure: StructureConfig,
     /// How edges and surface are combined into one number.
     pub agreement: AgreementConfig,
@@ -129,8 +129,8 @@ impl Default for SurfaceConfig {
     }
 }
 
-/// How edge directions are compared in both directions; see [`crate::Structure`]. Chosen by hand, not measured
-/// separately: with them the score's loss on held-out generated parts fell from 372 to 274
+/// How edges missing in photo or picture are counted; see [`crate::Structure`]. Chosen by hand, not measured
+/// separately: with the regions the score's loss on held-out generated parts fell from 372 to 274
 /// (docs/decisions/007-score.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -165,9 +165,9 @@ pub struct AgreementConfig {
     /// that; no measurement is recorded.
     pub extent: f64,
     /// The weight of the surface in the average with the edges, which have the remaining weight. Fitted on the
-    /// simulator's pictures: weights of 7 : 2 : 1 for edges, cells and whole surface left 30 of 950 right poses below
-    /// the best wrong one of any part, weights of 6 : 4 for edges and whole surface left 48. The earlier value, 0.4,
-    /// was fitted on levers that resemble the pendulum.
+    /// simulator's pictures: of 950 right poses, 30 scored below a wrong one with weights 7 : 2 : 1 of edges, cells and
+    /// whole surface, and 48 with weights 6 : 4 of edges and whole surface. The earlier value, 0.4, was fitted on
+    /// levers that resemble the pendulum.
     pub surface_share: f64,
 }
 

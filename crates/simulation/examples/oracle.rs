@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             // held.
             let is_last = Some(step) == report.hand_verdicts.last().map(|(step, _)| step);
             if why.is_none() != (!is_last || report.outcome.is_held()) {
-                println!("{name} seed {seed}: after {step} the hand says {why:?}, the truth {:?}", report.outcome);
+                println!("{name} seed {seed}: after {step} failure by the hand {why:?}, outcome {:?}", report.outcome);
             }
         }
         if let GraspOutcome::Failed { step, why } = &report.outcome {

@@ -1,4 +1,4 @@
-//! Kills commands at random moments of a seed, each with a simulated power cut.
+//! Kills commands at random moments (seeded), each with a simulated power cut.
 //!
 //! ```text
 //! folder with inputs ─ the command, traced, killed before change k ─ the folder as the disk holds it ─ inputs unchanged? output
@@ -103,7 +103,8 @@ fn traced(
         if scenario == Scenario::Annotate {
             let photo = fs::read("datasets/demonstrations/pendulum/image.png");
             let done = Page::of(printed).and_then(|page| page.mark_teach_and_try(&photo?));
-            // SAFETY: no memory is involved. The tracer reaps the process, so until then the number is this program's.
+            // SAFETY: no memory is involved. If the tracer has already reaped the process, its id is normally unused,
+            // and the call fails.
             unsafe { libc::kill(pid, libc::SIGINT) };
             return done;
         }
@@ -121,7 +122,7 @@ fn traced(
     Ok((ending, changes, disk))
 }
 
-/// Kills a command once, cuts the power, checks the folder, and runs the command again.
+/// Kills a command once, cuts the power and checks the folder; after some of the kills, runs the command again.
 fn one(
     scenario: Scenario,
     number: u64,

@@ -41,10 +41,9 @@ pub struct TeachArgs {
     /// several views
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
-    /// Teach many parts: a folder of photos with marks beside them, each of one part, and of folders with several
-    /// photos of one part. --out is then a folder for the models and a page that lists similar parts and parts that
-    /// need another photo. Existing models are kept. Lines "NAME 4" or "NAME full" in its symmetries.txt give a part's
-    /// --symmetry
+    /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out
+    /// is then a folder for the models and a page that lists similar parts and parts that need another photo. Existing
+    /// models are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a part's --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
     /// Teach only this part of --demos, without the page, so that several machines can each teach some of the parts;
@@ -52,8 +51,8 @@ pub struct TeachArgs {
     #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
-    /// calibrated so that nothing is accepted in it, as long as nine in ten parts are still accepted; repeat for
-    /// several
+    /// calibrated so that nothing is accepted in it, as long as nine in ten parts in held-out samples are still
+    /// accepted; repeat for several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write
@@ -74,8 +73,8 @@ pub struct TeachArgs {
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
     /// Smallest and largest size of the part in a picture, relative to its size in the photo: 0.95-1.05 if the camera's
-    /// height is constant, which also distinguishes parts of different sizes; a wider range if it is not, or if the
-    /// photo was both cropped and resized
+    /// height is constant, which also distinguishes parts of different sizes; a wider range if the height varies, or if
+    /// the photo was both cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts
@@ -90,11 +89,12 @@ pub struct TeachArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
     /// Initial weights: base weights made by `make base-weights`, any file that `sdg weights convert` reads or writes,
-    /// a grasp model, or none for random initialisation; default: preset edge starts from the base weights included in
+    /// a grasp model, or "none" (random initialisation); default: preset edge starts from the base weights included in
     /// this program
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
-    /// Initialise this part randomly in spite of --base-weights, such as roi_heads.box_predictor; repeat for several
+    /// Initialise parameters with this prefix randomly in spite of --base-weights, such as roi_heads.box_predictor;
+    /// repeat for several
     #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
     pub reinitialized: Vec<String>,
     /// Folder for a page on the teaching: photo and marks, samples, curves

@@ -26,7 +26,7 @@ pub struct Evaluation<'a> {
     /// Network, training and augmentation, as named in the settings of the store.
     pub preset: Preset,
     pub store: &'a Store,
-    /// Whether every grasp is also tried without the check against the demonstration.
+    /// Whether grasps of models with a network are also tried without the check against the demonstration.
     pub unverified: bool,
     /// Number of parallel units.
     pub jobs: usize,
@@ -90,7 +90,7 @@ impl Evaluation<'_> {
         Ok(tasks)
     }
 
-    /// Whether work is left for a cell: not after its teaching has failed.
+    /// Whether a cell has or will have a model: not after its teaching has failed.
     fn is_usable(&self, cell: Cell) -> Result<bool> {
         Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }

@@ -104,7 +104,7 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
     assert_eq!(&record["record"]["attempts"][0], first_attempt);
     assert_eq!(read(MODEL), model_file);
     // A further run has no units to do, and all results are unchanged.
-    assert_eq!(go_on(broken.path(), &|| panic!("asked although no work is left")), resumed);
+    assert_eq!(go_on(broken.path(), &|| panic!("is_interrupted called: no work left")), resumed);
 }
 
 /// Continues with some axes, like a separate process, and sums the results.
@@ -148,7 +148,7 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     let [GroupSummary { axes, look_alikes, grasps, .. }] = &whole.groups[..] else { panic!("{:?}", whole.groups) };
     let found = |axis: &str| axes.iter().find(|figures| figures.axis == axis).unwrap().found;
     assert_eq!((found("tilt").of, found("instances").of), (2, 6));
-    // The two pictures with the smallest tilt, and three orange pendulums on a table.
+    // Two pictures with the smallest tilts, and two with three pendulums each.
     assert!(found("tilt").count > 0 && found("instances").count >= 3, "{axes:?}");
     assert!(axes.iter().all(|figures| figures.way == Way::WithCheck), "S has no network");
     assert_eq!(
@@ -158,7 +158,7 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     assert_eq!((grasps[0].condition, grasps[0].held.of), (GraspCondition::MarkHeight, 2));
     assert!(whole.seconds.pictures > 0.0 && whole.seconds.grasps > 0.0);
     // A further run has no units to do.
-    assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked although no work is left")), whole);
+    assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("is_interrupted called: no work left")), whole);
 }
 
 /// Continues with some sets of the cameras' pictures, and sums the results.
@@ -196,6 +196,6 @@ fn interrupted_cameras_go_on_and_are_exact() {
     assert_eq!((of("other-sizes").accepted, of("other-sizes").found.of), (Share { count: 0, of: 2 }, 0));
     assert!(cameras::page(&whole, &[], "sdg evaluate --cameras").to_html().is_ok());
     // Finished units are not done again.
-    let again = go_on_with_cameras(folder.path(), &|| panic!("asked although no work is left"));
+    let again = go_on_with_cameras(folder.path(), &|| panic!("is_interrupted called: no work left"));
     assert_eq!(again.sets, whole.sets);
 }

@@ -32,7 +32,7 @@ pub(super) struct GoalConfiguration {
 /// The collision-free configurations of all poses, the fastest to reach from `start` first.
 ///
 /// # Errors
-/// Poses are invalid or cannot be reached, or all their configurations are blocked.
+/// A pose is invalid, no pose can be reached, or all configurations are blocked.
 pub(super) fn free_configurations(
     arm: &ArmGeometry,
     checker: &mut Checker<'_>,

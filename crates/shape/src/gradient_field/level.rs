@@ -18,7 +18,7 @@ pub(crate) struct GradientLevel {
     samples: Vec<[f32; 4]>,
     /// Samples per row.
     stride: usize,
-    /// The index of the first sample in a level with `stride` samples per row; 0 in a whole level.
+    /// Index of the corner, as row * `stride` + column; 0 for a whole level.
     before: usize,
     floor: f32,
     reading: Reading,
@@ -63,7 +63,7 @@ impl GradientLevel {
         Self { width, height, samples, stride: width, before: 0, floor, reading: Reading::new(width, height, width) }
     }
 
-    /// Part of a level, from its corner. Computed on the thread that needs it, because others may wait for it.
+    /// Part of a level, from its corner. Computed without the thread pool, because other threads may wait for it.
     pub(super) fn window(planes: &Planes, corner: [usize; 2], size: [usize; 2], floor: f32) -> Self {
         let (width, height) = (planes.width, planes.height);
         let mut samples = tensors_of_part(planes, corner, size);
@@ -104,7 +104,7 @@ impl GradientLevel {
         if !(x >= 0.0 && y >= 0.0 && x < width && y < height) {
             return None;
         }
-        // No image has more pixels per side than 32 bits hold; 64 bits take several times as long.
+        // The conversion to 32 bits suffices for any image and is several times faster than that to 64.
         let [dx, dy, energy, _] = *self.samples.get(self.idx_of(y as i32 as usize, x as i32 as usize))?;
         Some([dx, dy, energy])
     }

@@ -104,7 +104,7 @@ impl Change {
             }
             Self::Stretch { .. } => self.along_x(p),
             Self::Bore { .. } => {
-                // Pieces around the axis become narrower; a piece beside the axis (a ball) moves as a whole.
+                // Pieces around the axis get a narrower bore; a piece beside the axis (a ball) moves as a whole.
                 let around_axis = bounds.contains(&Point3::new(0.0, 0.0, bounds.centre().z), 0.0);
                 if around_axis { self.radially(p) } else { p + (self.radially(bounds.centre()) - bounds.centre()) }
             }

@@ -37,7 +37,7 @@ const BOARD: Color = Color([255, 196, 61]);
 /// Arguments of taking pictures.
 #[derive(Debug, Args)]
 pub struct TakingArgs {
-    /// Take the pictures with this camera: v4l:, v4l:/dev/video0, http://HOST/PATH, 'cmd:PROGRAM', dir:FOLDER
+    /// Take the pictures with this camera: v4l:, v4l:/dev/video0, http://HOST/PATH, 'cmd:PROGRAM', dir:FOLDER.
     ///
     /// A page opens that shows the board's corners, the views taken so far, and the view that is needed next. A picture
     /// is taken whenever the board is held still in a new view. Taking ends after 12 pictures if nothing is missing,

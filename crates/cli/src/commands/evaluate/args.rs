@@ -99,13 +99,13 @@ pub struct EvaluateArgs {
     /// Number of pictures without the part for each part, for false alarms
     #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub scenes: u32,
-    /// Also run every grasp without the check against the demonstration: this doubles the attempts
+    /// Also run every grasp of models A to D without the check against the demonstration
     #[arg(long)]
     pub unverified: bool,
     /// Evaluate pictures whose difficulty is raised along one axis at a time (height, tilt, slant, covered, dark, blur,
-    /// tint, clutter, instances, look-alikes; all: pictures), and grasps under errors (no-error, marks, mark-height,
-    /// hand-eye, friction, shake; all: grasps), instead of the paper's protocol. Without names: everything, on all
-    /// parts
+    /// tint, clutter, instances, look-alikes; "pictures": all of them), and grasps under errors (no-error, marks,
+    /// mark-height, hand-eye, friction, shake; "grasps": all of them), instead of the paper's protocol. Without names:
+    /// everything, on all parts
     #[arg(
         long,
         value_name = "NAMES",
@@ -148,7 +148,7 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub search_points: Option<u32>,
-    /// The --out folder of another run with --axes, to compare with on the same pictures
+    /// The --out folder of another run with --axes; the results on the same pictures are compared
     #[arg(long, value_name = "DIR", requires = "axes", help_heading = AXES)]
     pub against: Option<PathBuf>,
     /// Network, training and augmentation
@@ -169,7 +169,7 @@ pub struct EvaluateArgs {
     /// Folder for models and results; results that are already in it are kept and not computed again
     #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
     pub out: PathBuf,
-    /// Folder for the page; default: the folder of the results, for --pictures target/pictures-report
+    /// Folder for the page; default: the folder of the results, with --pictures target/pictures-report
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Sets of pictures on both sides of a split

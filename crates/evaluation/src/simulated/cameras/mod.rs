@@ -1,5 +1,5 @@
-//! Models that are taught in the plan view of one calibrated camera, and tested on pictures of other cameras: grasps in
-//! metres, compared with the ground truth.
+//! Models that are taught in the plan view of one calibrated camera, and tested on pictures of this and other cameras:
+//! grasps in metres, compared with the ground truth.
 //!
 //! ```text
 //! shipped photo and its camera ─ plan view ─ teach ┐
