@@ -36,8 +36,7 @@ const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3
 const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
 /// Joints 4 and 6 of an arm in self-collision, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
-/// Distance between the pose of the stop and the end of the motion just inside, as a fraction of the path to the folded
-/// pose.
+/// The motion inside ends this far before the pose of the stop, as a fraction of the path to the folded pose.
 const FOLD_MARGIN: f64 = 0.02;
 
 /// A limit, with one motion inside and one outside.
