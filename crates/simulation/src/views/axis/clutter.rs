@@ -1,4 +1,4 @@
-//! Distractors pushed against the part from all sides.
+//! Distractors pushed from all sides against the part, or against each other.
 
 use std::f64::consts::{PI, TAU};
 
