@@ -179,7 +179,7 @@ impl Arm for Workcell {
         self.hand()
     }
 
-    /// Does nothing: the simulated arm stops if a joint is more than [`BLOCKED_RAD`] from its reference.
+    /// Does nothing: the simulated arm stops if a joint is more than `BLOCKED_RAD` from its reference.
     fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
         Ok(())
     }
