@@ -86,7 +86,7 @@ walk: build ## Times the way from a photo to a tried model, through the page in 
 	@scripts/axe.sh
 	SDG_WALK="$(SETS)" $(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --nocapture walk::
 
-# A run without TUNED=1 looks at the reported side: record it in docs/decisions/025-acceptance.md.
+# A run without TUNED=1 measures the reported side: record it in docs/decisions/025-acceptance.md.
 MODELS ?= S
 acceptance: build ## Teaches the sets of datasets/split.toml and counts both sides of the split (SETS=FOLDER, MODELS=S,C; TUNED=1: one side)
 	target/release/sdg evaluate --split datasets/split.toml --sets "$(or $(SETS),../shared)" --models $(MODELS) $(if $(TUNED),--tuned)

@@ -40,7 +40,7 @@ fail() {
 }
 
 server=
-# The argument TERM ends Python, which ignores interrupts in the background; ours ends by an interrupt.
+# The argument TERM ends Python, which ignores interrupts in the background; our server ends by an interrupt.
 stop_server() {
     [ -z "$server" ] || kill "-${1:-INT}" "$server" 2>/dev/null || true
     [ -z "$server" ] || wait "$server" 2>/dev/null || true

@@ -65,7 +65,7 @@ INIT
 chmod +x "$root/init"
 (cd "$root" && find . | cpio --quiet -o -H newc | gzip -1) >"$work/initramfs.gz"
 
-# Not KVM, which is missing or broken in virtual machines; without it the boot also takes only seconds.
+# Not KVM, which is missing or broken in many virtual machines; without it the boot also takes only seconds.
 timeout 120 qemu-system-x86_64 -accel tcg -m 512 -smp 2 -nographic -no-reboot -nic none -kernel "$work/kernel/boot/vmlinuz-$kernel" \
     -initrd "$work/initramfs.gz" -append "console=ttyS0 quiet panic=-1" </dev/null 2>&1 | tr -d '\r' | tee "$work/log" |
     sed -n '/running [0-9]* test/,$p'

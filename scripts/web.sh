@@ -20,7 +20,8 @@ CARGO_TARGET_DIR=$build/bindgen env -u RUSTC -u RUSTC_BOOTSTRAP \
 build_module() {
     local folder=$1
     shift
-    # Vectors of 128 bits: all current browsers have them (from Chrome 91, Firefox 89, Safari 16.4); the page informs users of others.
+    # Vectors of 128 bits: all current browsers have them (from Chrome 91, Firefox 89, Safari 16.4); the page informs
+    # users of older browsers.
     RUSTFLAGS="-Ctarget-feature=+simd128" CARGO_TARGET_DIR=$build \
         "$cargo_for_target" rustc --locked --profile web --package sdg-web --lib --crate-type cdylib --target "$target" \
         "${standard_library[@]}" "$@"

@@ -1,6 +1,6 @@
 //! Checks of the sources and documents themselves, run by `tests/`: no two files of a crate import from each other,
-//! every link in a document has a target, the table of crates in ARCHITECTURE.md agrees with `cargo metadata`, and
-//! tables of figures state the commit of their measurement and whether the program changed since.
+//! every relative link in a document has a target, the table of crates in ARCHITECTURE.md agrees with `cargo metadata`,
+//! and tables of figures state the commit of their measurement and whether the program changed since.
 //!
 //! ```
 //! use sdg_checks::ModuleGraph;

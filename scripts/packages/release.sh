@@ -10,7 +10,7 @@ if [ -z "${DIRTY:-}" ] && [ -n "$(git status --porcelain)" ]; then
     echo "release: expected a clean working tree, so that the commit identifies the sources; found changes (git status); DIRTY=1 builds anyway" >&2
     exit 1
 fi
-# At most twenty lines per version, because nobody reads more.
+# At most twenty lines per version.
 awk '/^## / { version = $0; lines = 0 } /^- / && ++lines > 20 { print "release: CHANGELOG.md: " version " has more than 20 lines"; exit 1 }' CHANGELOG.md >&2
 scripts/packages/semver.sh
 

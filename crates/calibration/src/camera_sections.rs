@@ -1,6 +1,6 @@
 //! Updates a camera file and keeps the rest of it: comments, and fields of other programs.
 //!
-//! A section is a line that starts with the section's name, and the indented lines after this line. All tools write
+//! A section is a line that starts with the section's name, and the indented lines after this line. ROS's tools write
 //! `camera_info` in this form.
 
 /// Replaces each of the `known` sections of `existing` by the section of the same name in `sections`, or removes it if

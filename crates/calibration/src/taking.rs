@@ -12,7 +12,7 @@ const STILL_SHARE: f64 = 0.002;
 /// Number of successive frames at rest that are required, so that no picture is blurred.
 const STILL_FRAMES: u32 = 4;
 /// A view is new if its corners are at least this far from those of every other view, as a fraction of the diagonal.
-/// Chosen by hand: 48 pixels of 640 × 480, a tenth of the board's width if it fills the picture.
+/// Chosen by hand: 48 pixels of 640 × 480.
 const NEW_PLACE_SHARE: f64 = 0.06;
 /// Like [`NEW_PLACE_SHARE`], for the corners relative to their centre: another tilt or size at the same place. Chosen
 /// by hand: 10 pixels of 640 × 480, the effect of a tilt by 25 degrees on a board that fills half of the picture.

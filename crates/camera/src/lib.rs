@@ -6,9 +6,10 @@
 //!                                                                                  LatestFrame ─┘ a thread; newest frame only
 //! MjpegServer: pictures out, to browsers on this computer
 //! ```
-//! [`Camera::next_frame`] returns within about the stall timeout, with a [`Frame`] or an error. A camera's problem is a
-//! [`Fault`]. If there is a picture (frozen, black, other size, back again), the fault is in [`Frame::faults`]; without
-//! a picture (stale, torn, gone), the fault is a [`CameraError::Fault`], and the next call tries again.
+//! [`Camera::next_frame`] returns a [`Frame`] or an error within about the stall timeout, or `None` at the end; it
+//! waits longer only for a requested interval between pictures. A camera's problem is a [`Fault`]. If there is a
+//! picture (frozen, black, other size, back again), the fault is in [`Frame::faults`]; without a picture (stale, torn,
+//! gone), the fault is a [`CameraError::Fault`], and the next call tries again.
 //!
 //! Not in this crate: lenses and tables (crate `calibration`), the simulated camera (crate `simulation`, which opens
 //! [`Address::Sim`]), topics of ROS 2 (crate `ros2`), TLS, sound, and video codecs other than motion JPEG.

@@ -251,7 +251,7 @@ fn stream_pictures(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<(
     Ok(())
 }
 
-/// Waits for a picture after number `last`; `None` if the server ends and all pictures were taken.
+/// Waits for a picture after number `last`; `None` if the server ends and its newest picture was taken.
 fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
     let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
     loop {

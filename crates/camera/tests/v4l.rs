@@ -1,6 +1,6 @@
 //! Cameras of Video4Linux 2, read through real drivers: `make test-v4l` boots a kernel with them in QEMU.
 //!
-//! [`UsbCamera`] is a webcam simulated by the test; for `uvcvideo`, the driver of all webcams, it is the same as a real
+//! [`UsbCamera`] is a webcam simulated by the test; for `uvcvideo`, the driver of USB webcams, it is the same as a real
 //! one. `vivid` is the kernel's test camera; it draws eight colour bars, by which the pixels are checked.
 
 use std::time::{Duration, Instant};

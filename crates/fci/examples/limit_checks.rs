@@ -1,10 +1,10 @@
-//! Checks that a robot stops for every limit and not before it: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
+//! Checks that a robot stops for its limits and not before them: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
 //!
-//! Runs one motion just inside and one just outside of every limit and prints a line for each. It ends with an error if
-//! a motion inside was stopped, or if a motion outside was not stopped or was stopped for another reason. For a robot
-//! in real time, TRIES (default 1) is the maximum number of attempts at each motion, because a lost command may look
-//! like a violated limit. `joints` is for a robot that applies its joint limits to Cartesian motions: only
-//! those limits are tested, and the arm is folded until it would touch itself.
+//! Runs one motion just inside and one just outside of each tested limit and prints a line for each. It ends with an
+//! error if a motion inside was stopped, or if a motion outside was not stopped or was stopped for another reason. For
+//! a robot in real time, TRIES (default 1) is the maximum number of attempts at each motion, because a lost command may
+//! look like a violated limit. `joints` is for a robot that applies its joint limits to Cartesian motions: only those
+//! limits are tested, and the arm is folded until it would touch itself.
 
 #[path = "../tests/limit_cases/mod.rs"]
 mod limit_cases;

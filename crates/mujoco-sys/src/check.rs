@@ -15,7 +15,7 @@ pub fn load() -> Result<(), LibraryError> {
     library::load(check)
 }
 
-/// Checks the library's version and the size of every struct that MuJoCo initialises for us.
+/// Checks the library's version and the sizes of seven structs that MuJoCo initialises for us.
 ///
 /// Takes microseconds.
 fn check(functions: &Functions) -> Result<(), LibraryError> {

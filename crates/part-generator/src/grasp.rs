@@ -70,7 +70,8 @@ fn along(
 ) -> Vec<(f32, PartGrasp)> {
     let (sin, cos) = angle.sin_cos();
     let bin = cell * 1.5;
-    // Coordinates along and across the line, from the centre; the extent across for each bin along.
+    // Coordinates along and across the line, from the centre, and the height; `extents` has, for each bin along the
+    // line, the range across it and the largest height.
     let turned: Vec<(f32, f32, f32)> = points
         .iter()
         .map(|&([x, y], top)| {

@@ -12,7 +12,7 @@ use crate::random::{Draw, Stream, generator};
 use crate::recipe::{self, Recipe};
 use crate::relief::Relief;
 
-/// Number of recipes that are tried. About one in four is rejected, so no seed reaches this limit.
+/// Number of recipes that are tried. About one in four is rejected, so that no seed is expected to reach this limit.
 const MAX_TRIES: u64 = 400;
 
 /// Minimum diagonal of a part, in millimetres.

@@ -88,7 +88,7 @@ pub enum HandCommand {
 
 /// Tolerances below (first) and above (second) the commanded width of a part, m. The tolerances are wide because a
 /// width measured in a picture is accurate to a few millimetres only, and a round part may be gripped beside its
-/// thickest point. They are narrow enough to detect a hand that closed without a part.
+/// thickest point. [`MIN_HELD_WIDTH_M`] detects a hand that closed without a part.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;

@@ -1,4 +1,4 @@
-//! Errors of a robot, with the expected and the found value.
+//! Errors of a robot, of planning and of perception.
 
 use std::error::Error;
 
@@ -31,7 +31,7 @@ pub enum RobotError {
     /// The arm stopped by itself.
     #[error("the arm stopped itself: {0}")]
     Reflex(String),
-    /// The arm does not move because it stopped before.
+    /// The arm does not move until it is recovered from an earlier error.
     #[error("nothing moves until a person has checked the arm and runs `sdg robot recover`: {0}")]
     Latched(String),
     /// Arm or hand never answered.

@@ -77,7 +77,7 @@ impl LyingPart {
     }
 }
 
-/// Lying parts, without duplicates: of several at one position only the latest is kept.
+/// Lying parts, at most one at each position.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LyingParts(Vec<LyingPart>);
 

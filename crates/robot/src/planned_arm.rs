@@ -52,7 +52,7 @@ impl PlannedArm {
         &self.actions
     }
 
-    /// Duration of the recorded sequence, s; motions of the hand in parallel with the arm take no time.
+    /// Duration of the recorded sequence, s; motions of the hand take no time.
     pub fn duration_secs(&self) -> f64 {
         self.state.time_secs
     }
@@ -157,9 +157,9 @@ impl Arm for PlannedArm {
 }
 
 impl CompliantArm for PlannedArm {
-    /// Assumes the contact at its expected height: [`TouchDown::below_table_m`] above the end of the path.
+    /// Assumes that a held part touches its place at the expected height, [`TouchDown::below_table_m`] above the end of
+    /// the path, and that an open hand touches nothing.
     fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
-        // A held part touches its place before the path's end; the open hand of an approach touches nothing.
         let is_contact = self.hand.is_grasping;
         let after_contact_m = if is_contact { touch_down.below_table_m } else { 0.0 };
         let way_m = (touch_down.max_way_m - after_contact_m).max(0.0);

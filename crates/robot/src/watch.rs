@@ -44,7 +44,7 @@ pub const HISTORY_SECS: f64 = 1.0;
 const MAX_SPEED_SHARE: f64 = 2.0;
 const NOISE_RAD: f64 = 0.005;
 
-/// Called once in every cycle; returns the reason if the motion must stop.
+/// Called for each state until a reason to stop, and before motions; returns the reason if the arm must stop.
 pub type StopRequest = Box<dyn FnMut() -> Option<StopReason> + Send>;
 
 /// Checks every state of a moving arm.
@@ -71,7 +71,7 @@ impl Default for Watch {
 }
 
 impl Watch {
-    /// Calls `request` in every cycle.
+    /// A watch that asks `request` for reasons to stop.
     pub fn new(request: StopRequest) -> Self {
         let velocity_max = JointLimits::panda().velocity_max;
         Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS, velocity_max }

@@ -1,4 +1,4 @@
-//! Errors of ROS 2, with the expected and the found value.
+//! Errors of ROS 2.
 
 use crate::cdr::CdrError;
 

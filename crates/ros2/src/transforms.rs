@@ -17,7 +17,7 @@ const HISTORY_SECS: f64 = 10.0;
 const MAX_POSES: usize = 4000;
 /// Maximum number of frames, as a limit for data from the network; no cell has as many.
 const MAX_FRAMES: usize = 2000;
-/// Maximum length of a chain of frames; a longer chain contains a loop.
+/// Maximum length of a chain of frames; a longer chain counts as a loop.
 const MAX_DEPTH: usize = 100;
 
 /// The known transforms between frames.

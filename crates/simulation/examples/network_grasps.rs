@@ -3,7 +3,7 @@
 //! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
 //!
 //! Ends with an error if an attempt in lockstep and the same one in one process differ in whether the part is held, or
-//! if in real time fewer attempts hold the part, by more than 5 of 240.
+//! if the number of held parts in real time is lower than in one process by more than 5 per 240 attempts.
 
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};

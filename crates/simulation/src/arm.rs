@@ -179,7 +179,7 @@ impl Arm for Workcell {
         self.hand()
     }
 
-    /// The simulated arm stops at every obstacle, at any sensitivity.
+    /// Does nothing: the simulated arm stops if a joint is more than `BLOCKED_RAD` from its reference.
     fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
         Ok(())
     }

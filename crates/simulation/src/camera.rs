@@ -110,8 +110,8 @@ mod tests {
                 pixels.iter().map(|p| f64::from(f(p)) + 0.5).sum::<f64>() / pixels.len() as f64
             };
             let found = (mean(|p| p.0), mean(|p| p.1));
-            // A ball's outline is an ellipse around nearly its centre; a tenth of a pixel is the
-            // raster's own error of its mean.
+            // A ball's outline is an ellipse around nearly its centre; the mean of its pixels has an error of a tenth
+            // of a pixel.
             assert!(
                 (found.0 - expected.x).hypot(found.1 - expected.y) < 0.25,
                 "{name}: found {found:?}, expected {expected:?}"

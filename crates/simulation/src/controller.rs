@@ -1,9 +1,9 @@
 //! Computed torque control: the arm follows a reference in joint space.
 //!
 //! `tau = M(q) (qdd_ref + Kp (q_ref - q) + Kd (qd_ref - qd)) + bias(q, qd) - passive(q, qd)`, clamped at the motors'
-//! limits. With the model's own mass matrix, the error of every joint decays like a critically damped oscillator in any
-//! posture. The bias does not include a grasped part; at this stiffness a part causes an error of a fraction of a
-//! millimetre.
+//! limits. Within these limits and with the model's own mass matrix, the error of every joint decays like a critically
+//! damped oscillator in any posture. The bias does not include a grasped part; at this stiffness a part causes an error
+//! of a fraction of a millimetre.
 
 use crate::data::Data;
 use crate::panda::{ArmVector, NUM_ARM_JOINTS, PandaIds};

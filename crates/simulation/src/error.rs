@@ -66,7 +66,7 @@ pub enum SimulationError {
     #[error("{}: {reason}", path.display())]
     File {
         path: PathBuf,
-        /// The error, with the expected and the found value.
+        /// The error.
         reason: String,
     },
 

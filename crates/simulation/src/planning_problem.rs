@@ -29,7 +29,7 @@ impl PlanningProblem {
     const FREE_M: f64 = 0.01;
     /// Maximum number of obstacles that are added to a problem.
     const MAX_ADDED: usize = 4;
-    /// Radius of these obstacles, m.
+    /// Radius of the added obstacles, m.
     const BALL_RADIUS_M: f64 = 0.08;
     /// Minimum distance of start and goal from the joints' limits, rad.
     const INSIDE_RAD: f64 = 0.05;

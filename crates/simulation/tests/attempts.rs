@@ -1,4 +1,4 @@
-//! Whole grasp attempts: the success of the robot with the true pose of the part, and every kind of failure.
+//! Whole grasp attempts: the success of the robot with the true pose of the part, and kinds of failure.
 //!
 //! `examples/oracle.rs` runs twenty attempts per part; these tests run only a few, to save time.
 

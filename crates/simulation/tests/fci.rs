@@ -1,4 +1,5 @@
-//! The client of `sdg-fci` drives its server with MuJoCo, in lockstep: every generator and controller, and every limit.
+//! The client of `sdg-fci` drives its server with MuJoCo, in lockstep: every generator and controller, and the limits
+//! of limit_cases.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;

@@ -17,7 +17,7 @@ use sdg_fci::wire::{
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
-/// Largest time until the arm is at rest. A joint of a Panda brakes from its full speed in at most 0.29 s, this one in
+/// Largest time until the arm is at rest. A joint of a Panda brakes from its full speed in at most 0.29 s, joint 1 in
 /// 0.03 s from the test's speed; the rest allows for the controller to settle.
 const STOPPING_TIME: Duration = Duration::from_millis(200);
 

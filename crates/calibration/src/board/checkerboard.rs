@@ -76,7 +76,8 @@ impl Board {
     /// The board as printed by a printer that prints 100 mm as `measured_mm`.
     ///
     /// # Errors
-    /// [`CalibrationError::Ruler`] for a deviation of more than a tenth, which no printer has.
+    /// [`CalibrationError::Ruler`] for a deviation of more than a tenth: it is attributed to the measurement, not to
+    /// the printer.
     pub fn as_printed(&self, measured_mm: f64) -> Result<Self, CalibrationError> {
         if !(90.0..=110.0).contains(&measured_mm) {
             return Err(CalibrationError::Ruler { measured_mm });

@@ -87,7 +87,7 @@ impl Grid {
     }
 }
 
-/// All grids, largest first.
+/// Grids of at least four corners from at most [`MAX_SEEDS`] seeds, largest first.
 pub(super) fn grow_all(saddles: &[Saddle]) -> Vec<Grid> {
     let mut is_used = vec![false; saddles.len()];
     let mut grids = Vec::new();

@@ -69,7 +69,8 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
                         found = corners;
                     }
                 }
-                // The error of the first sufficiently large grid is the most informative: later grids are parts of it.
+                // The error of the first sufficiently large grid is kept: later grids are not larger, or have a lower
+                // resolution.
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }

@@ -14,7 +14,8 @@ use crate::error::CalibrationError;
 
 /// Largest angle of a usable rotation, in radians: near π the sign of the axis is undetermined.
 const MAX_ANGLE: f64 = 2.9;
-/// Minimum root mean square rotation about the second axis, in degrees: a noise of 0.1 degrees is a fortieth of it.
+/// Minimum root mean square rotation about the axis with the second largest one, in degrees: forty times a noise of 0.1
+/// degrees.
 const MIN_SECOND_TURN_DEG: f64 = 4.0;
 
 /// The lever arm, in metres, that converts shifts to angles: about the distance of boards from flanges.

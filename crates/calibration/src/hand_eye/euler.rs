@@ -64,7 +64,7 @@ impl Composition {
             Self::RotationVector { .. } => {
                 let vector = rotation.scaled_axis();
                 let angle = vector.norm();
-                // The same rotation, in the opposite direction.
+                // The same rotation, in the opposite direction by the rest of a full turn.
                 let far = if angle > 0.0 { vector * (1.0 - 2.0 * PI / angle) } else { vector };
                 [vector.into(), far.into()]
             }

@@ -23,7 +23,7 @@ pub(super) struct Answer {
     pub(super) body: Body,
 }
 
-/// The client's answer to the server's authentication challenge. It is kept between pictures, so that each picture
+/// The client's answer to the server's authentication challenge. It is kept between pictures, so that a picture usually
 /// needs only one request.
 #[derive(Default)]
 pub(super) struct Login(Option<PasswordClient>);

@@ -46,7 +46,7 @@ impl Url {
         self.credentials.as_ref().map(|Credentials { user, password }| (user.as_str(), password.as_str()))
     }
 
-    /// The target of a redirect. User name and password are sent only to the same host and port.
+    /// The target of a redirect. User name and password of this address are sent only to the same host and port.
     ///
     /// # Errors
     /// Text that says why the target is not followed.

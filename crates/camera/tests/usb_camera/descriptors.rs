@@ -39,9 +39,9 @@ fn configuration() -> Vec<u8> {
             &[13, 0x24, 1, 0, 1, 0, 0, 0, 0x6c, 0xdc, 2, 1, 1][..],
             // Camera terminal 1 with exposure mode (bit 1) and exposure time (bit 3).
             &[18, 0x24, 2, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0x0a, 0, 0],
-            // Processing unit 2 after it, with white balance temperature (bit 6), automatic or not (bit 12).
+            // Processing unit 2 after terminal 1, with white balance temperature (bit 6), automatic or not (bit 12).
             &[11, 0x24, 5, 2, 1, 0, 0, 2, 0x40, 0x10, 0],
-            // Output terminal 3 after that.
+            // Output terminal 3 after unit 2.
             &[9, 0x24, 3, 3, 1, 1, 0, 2, 0],
         ]
         .concat(),

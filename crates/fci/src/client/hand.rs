@@ -27,7 +27,7 @@ impl Default for HandConfig {
     }
 }
 
-/// A connected hand. Calls return when the fingers have stopped.
+/// A connected hand. Calls that move the fingers return when these have stopped.
 #[derive(Debug)]
 pub struct Hand {
     session: Session,

@@ -140,7 +140,7 @@ impl Robot {
         StopHandle { sending: self.session.sending.clone(), version: self.version }
     }
 
-    /// Stops every motion.
+    /// Stops the running motion.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.

@@ -1,4 +1,4 @@
-//! One motion just inside and one just outside of every limit that a robot checks, with this crate's client.
+//! One motion just inside and one just outside of each tested limit of a robot, with this crate's client.
 //!
 //! Each motion moves one signal to `1 - MARGIN` or `1 + MARGIN` of its limit, while all other signals stay well within
 //! their limits.
@@ -26,8 +26,8 @@ const MEASURED_BEYOND: f64 = 0.4;
 const MEASURED_END_MARGIN: f64 = 0.1;
 /// The usual start configuration of a Panda, rad.
 pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];
-/// Rotation of joint 2 per metre forward at the ready pose, with the smallest motion of all joints, rad/m: an entry of
-/// the Jacobian's pseudoinverse. No other joint comes as close to its limits in this motion.
+/// Rotation of joint 2 per metre forward at the ready pose, in the smallest joint motion (least squares), rad/m: an
+/// entry of the Jacobian's pseudoinverse. No other joint comes as close to its limits in this motion.
 const JOINT_2_PER_METRE: f64 = 3.1520;
 /// A configuration just far enough from a singular one for the start of a Cartesian motion, rad: the smallest singular
 /// value of the end effector's Jacobian is 0.053, and 0.048 at [`SINGULAR`], both at the flange and at the finger tips.
@@ -36,8 +36,7 @@ const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3
 const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
 /// Joints 4 and 6 of an arm in self-collision, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
-/// Distance between the pose of the stop and the end of the motion just inside, as a fraction of the path to the folded
-/// pose.
+/// The motion inside ends this far before the pose of the stop, as a fraction of the path to the folded pose.
 const FOLD_MARGIN: f64 = 0.02;
 
 /// A limit, with one motion inside and one outside.
@@ -83,7 +82,7 @@ impl fmt::Display for Found {
     }
 }
 
-/// A case for every limit.
+/// The cases, except those of [`joints_of_cartesian_motions`] and [`fold`].
 pub fn all(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
     let case = |name, error, signal: &dyn Fn(f64) -> Signal| Case {
@@ -207,7 +206,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         Case {
             name: "first position",
             reason: Reason::Stop(RobotError::JointPositionMotionGeneratorStartPoseInvalid),
-            // A step to a constant position has twice its jerk at the end of the step.
+            // At the end of a step to a constant position, the jerk is twice that at the start of the step.
             inside: Signal::StartPosition { offset: 0.5 * jerk * 1e-9 * inside },
             outside: Signal::StartPosition { offset: 0.101 },
         },

@@ -44,7 +44,7 @@ pub enum Signal {
     Unanswered { num: u64 },
     /// The speed of an end effector whose frame is [`FAR_END_M`] beyond the finger tips; joint 6 moves it.
     FarEnd { profile: Profile },
-    /// A constant pose, started from joint positions.
+    /// A constant pose: that of the arm at the joint positions `from`.
     StandingPose { from: [f64; 7] },
 }
 

@@ -146,7 +146,7 @@ def main():
 
     run("twists", robot.control_cartesian_velocity, twists, 2.0, controller_mode=STIFF)
 
-    # Torques: holds with a spring of its own; gravity is the robot's.
+    # Torques of a spring hold the arm; the robot adds gravity compensation.
     start = robot.read_once().q
 
     def torques(state, t):
@@ -170,7 +170,7 @@ def main():
 
     joints_and_torques()
 
-    # An error of each kind that a client makes without wanting to, and the recovery.
+    # A jump of the command stops the robot; then the recovery.
     def jump(state, t):
         q = list(state.q_d)
         q[0] += 1.0 if t > 0.1 else 0.0
@@ -234,7 +234,7 @@ def main():
         check("a broken callback ends the motion", "broken" in str(exception), type(exception).__name__)
     check("  idle again", robot.read_once().robot_mode == libfranka.RobotMode.kIdle)
 
-    # Long: most of the 10,000 commands.
+    # A long motion: most of its 10,000 commands must arrive in time.
     run("joint positions for 10 s", robot.control_joint_position,
         lambda state, t, start=robot.read_once().q_d: libfranka.JointPositions(
             [q + (0.3 * swing(5.0)(t % 5.0) if i == 1 else 0.0) for i, q in enumerate(start)]),

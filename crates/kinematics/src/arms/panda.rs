@@ -162,7 +162,7 @@ fn capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     ]
 }
 
-/// Fewer and wider capsules. A test in the same file checks that they contain all visible shapes.
+/// Fewer and wider capsules. A test in crates/simulation/src/extent.rs checks that they contain all visible shapes.
 fn wide_capsules() -> [Vec<Capsule>; NUM_JOINTS + 1] {
     let c = Capsule::new;
     [

@@ -1,7 +1,7 @@
 //! The arm at several configurations in parallel, one for each lane: arrays of one coordinate each, which the compiler
 //! vectorises.
 //!
-//! Every function is one loop over all lanes, without branches.
+//! The inner loops run over the lanes and avoid branches.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use crate::capsule::nearest_shares;

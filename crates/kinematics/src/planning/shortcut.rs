@@ -24,8 +24,8 @@ pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLi
     (to - from).abs().component_div(&limits.velocity_max).max()
 }
 
-/// Replaces parts of a path with straight motions and moves waypoints, in at most `attempts` attempts: first from
-/// waypoint to waypoint, then between random points.
+/// Replaces parts of a path with straight motions: first from waypoint to waypoint, then in at most `attempts` attempts
+/// between random points. Each attempt also moves a waypoint.
 pub(super) fn shorten(
     checker: &mut Checker<'_>,
     limits: &JointLimits,

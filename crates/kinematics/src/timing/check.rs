@@ -1,4 +1,4 @@
-//! Checks whether a motion satisfies its limits everywhere.
+//! Checks whether a motion satisfies its limits at closely spaced times.
 
 use nalgebra::Vector3;
 

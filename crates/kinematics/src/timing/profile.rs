@@ -1,7 +1,7 @@
-//! `s(t)` whose second derivative is the moving average of a piecewise constant function over a time window.
+//! Motion along a path, `s(t)`: the moving average of a piecewise quadratic s₀ over a time window.
 //!
-//! With P the integral of the piecewise quadratic s₀ and w the window's length, the average is `s(t) = (P(t) - P(t -
-//! w)) / w`; its derivatives follow in the same way from s₀, ṡ₀ and s̈₀. The result is exact, and continuous up to s̈.
+//! With P the integral of s₀ and w the window's length, `s(t) = (P(t) - P(t - w)) / w`; its derivatives follow in the
+//! same way from s₀, ṡ₀ and s̈₀. The result is exact, and continuous up to s̈.
 
 use super::phase_plane::Phase;
 

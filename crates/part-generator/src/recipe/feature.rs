@@ -181,7 +181,7 @@ pub(crate) struct Feature {
     pub group: u16,
 }
 
-/// A feature with values precomputed for all points.
+/// A feature with the values that are equal for all points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prepared<'a> {
     feature: &'a Feature,

@@ -187,7 +187,7 @@ impl SceneConfig {
         }
     }
 
-    /// Checks every value.
+    /// Checks the values.
     ///
     /// # Errors
     /// A value is outside its range; the error names it.

@@ -27,7 +27,8 @@ const STANDING_RAD_S2: f64 = 0.05;
 /// A reference within this distance of the motion's end has arrived, rad: a hundredth of a millimetre at the tcp.
 const ARRIVED_RAD: f64 = 1e-5;
 /// Largest credible distance of a reference from the trajectory, rad. A robot that continues for 19 cycles without
-/// commands is less than 0.01 rad from its trajectory, so that a larger distance is an error of the reported state.
+/// commands is less than 0.01 rad from its trajectory, so that a distance above 0.1 rad is an error of the reported
+/// state.
 const MAX_DEVIATION_RAD: f64 = 0.1;
 /// A robot that sent no state for longer than this, ms, has left the motion.
 const MAX_ELAPSED_MS: u64 = 1000;
@@ -82,7 +83,7 @@ impl<'a> Follower<'a> {
         self.playback.stop();
     }
 
-    /// Number of times at which the robot was not at its commanded position.
+    /// Number of states in which the robot was not at its commanded position.
     #[cfg(test)]
     pub(super) fn num_corrections(&self) -> u32 {
         self.num_corrections

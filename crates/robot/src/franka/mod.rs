@@ -34,8 +34,8 @@ use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
-/// Maximum duration of every wait for the robot. A real robot stops by itself after 20 ms; a server in lockstep waits
-/// half a second for a lost packet and then continues.
+/// Maximum duration of a wait for a state; the client waits longer for stop, recovery and motions of the hand. A real
+/// robot stops by itself after 20 ms; a server in lockstep waits half a second for a lost packet and then continues.
 const TIMEOUT: Duration = Duration::from_secs(3);
 /// Maximum delay of a state behind an answer over TCP.
 const MAX_LATE: Duration = Duration::from_secs(1);
@@ -317,7 +317,6 @@ fn collision_behavior(sensitivity: ContactSensitivity) -> CollisionBehavior {
 mod tests {
     use super::*;
 
-    /// The thresholds are doubled where contact is intended, and are never larger.
     #[test]
     fn a_franka_stops_at_20_n_in_free_motion_and_at_40_n_where_it_may_touch() {
         for (sensitivity, max_n, max_nm) in

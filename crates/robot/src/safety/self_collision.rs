@@ -80,7 +80,7 @@ mod tests {
     }
 
     /// Fewer than 30 % of the configurations in the joints' ranges are refused, and fewer than 17.5 % because of any
-    /// one pair of bodies: the capsules are small enough for all normal motions.
+    /// one pair of bodies.
     #[test]
     fn no_pair_is_always_refused() {
         let panda = ArmGeometry::panda();

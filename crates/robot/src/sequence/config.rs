@@ -15,8 +15,8 @@ use crate::touch::TouchDown;
 
 /// Default centre of the first picture on the table, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
-/// Default height of a wrist camera above the table for every picture, m: that of the shipped demonstrations, so that a
-/// part has the same size in all pictures.
+/// Default height of a wrist camera above the table for detections, m: that of the shipped demonstrations, so that a
+/// part has the same size as in them.
 pub const LOOK_HEIGHT_M: f64 = 0.58;
 
 /// A pose of the arm for finding the part.

@@ -46,8 +46,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks")))
     }
 
-    /// Takes pictures from above the first detection until one confirms it: errors are smaller near the centre of the
-    /// picture.
+    /// Takes pictures from above the first detection until one confirms it or gives a score of at least [`SURE`]:
+    /// errors are smaller near the centre of the picture.
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         self.begin(GraspStep::Hover)?;
         let mut looks = 0;

@@ -45,7 +45,7 @@ pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place}
 
 use held_part::HeldPart;
 
-/// Minimum height of the arm above the table during free motions, m.
+/// Minimum height of the arm above the table during free motions, m; less if start or destination is lower.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
 /// Time that the arm stands still before a picture, s.
 const SETTLE_SECS: f64 = 0.25;

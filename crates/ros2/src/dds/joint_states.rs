@@ -74,7 +74,7 @@ impl StateReader {
             (Arc::clone(&known), Arc::clone(&is_stopped), config.clone(), states.topic().to_owned());
         let thread = std::thread::spawn(move || {
             while !stop.load(Ordering::SeqCst) {
-                // Malformed messages are skipped; missing states are reported by the reader of the states.
+                // Malformed messages are skipped; missing states are reported by the functions that read the states.
                 let Ok(Some(received)) = states.receive(Duration::from_millis(100)) else { continue };
                 let mut known = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 *known = merged(*known, &received.message, received.arrived, &config).or(*known);

@@ -1,6 +1,6 @@
 //! The network: nodes, topics, services and actions, and a camera and an arm that use them.
 //!
-//! Calls block for at most a given time; there is no asynchronous runtime.
+//! Calls that wait for the network have a timeout; there is no asynchronous runtime.
 
 mod action;
 mod action_server;

@@ -120,7 +120,7 @@ def main(program):
             elif goals == 2:
                 arm.end(goal, ABORTED, result(-4, "joint 7 was held"))
             elif goals == 4:
-                # Without a cancellation the client's line says how its motion ended instead.
+                # Without a cancellation the goal succeeds, which the client's line then states.
                 arm.end(goal, SUCCEEDED if play(goal, wanted.trajectory, True) else CANCELED, result(0, ""))
         for head, content in hand.goals.requests():
             goal, wanted = content[:16], unpack(content[16:], "control_msgs/msg/GripperCommandGoal")

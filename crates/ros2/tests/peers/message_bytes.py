@@ -89,7 +89,7 @@ def base_of(name, dice):
     if name.startswith("float"):
         return float(np.float32(dice.uniform(-5, 5)))
     if name in ("octet", "byte", "char"):
-        # rosbags treats some of them as signed.
+        # rosbags treats some of these types as signed.
         return dice.randrange(128)
     bits = int(name.lstrip("uint"))
     return dice.randrange(2**bits) if name[0] == "u" else dice.randrange(-(2 ** (bits - 1)), 2 ** (bits - 1))

@@ -49,7 +49,7 @@ pub struct Part {
     pub jaw_width: f64,
     pub grasp_height: f64,
     pub mark_height: f64,
-    /// The highest surface at the marks, if it is above them.
+    /// Height of the visible surface at the marks.
     pub seen_height: f64,
     pub friction: f64,
     pub symmetry: RotationalSymmetry,

@@ -324,7 +324,7 @@ mod tests {
                     .map(|angle| (reach_m(&spec, angle) - reach_m(&spec, angle + turn)).abs())
                     .fold(0.0, f64::max)
             };
-            // These rotations represent all others.
+            // Symmetries of 2, 3 and 4 folds.
             for turn in [2.0, 3.0, 4.0].map(|parts| std::f64::consts::TAU / parts) {
                 let hidden = spec.symmetry.distance(Angle::from_radians(turn), Angle::ZERO) < 1e-9;
                 let change_m = change_m(turn);

@@ -1,7 +1,7 @@
 //! Solids from which parts are built: extrusions with chamfered edges, solids of revolution, bent tubes, screw threads.
 //!
-//! Every function returns a closed mesh in metres, standing on z = 0 unless stated otherwise, with texture
-//! coordinates in which 1 is one repeat of the texture.
+//! The meshes are closed, in metres, and stand on z = 0 unless stated otherwise; in their texture coordinates, 1 is one
+//! repeat of the texture.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Distractors pushed against the part from all sides.
+//! Distractors pushed from all sides against the part, or against each other.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +15,7 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Number of distractors.
 const NUM_THINGS: std::ops::RangeInclusive<usize> = 10..=15;
 
-/// Number of distractors that touch the part, if there is room; the others touch these distractors.
+/// Number of distractors that touch the part, if there is room; further ones touch any object.
 const NUM_TOUCHING: usize = 7;
 
 /// Number of directions tried for a distractor to touch the part.

@@ -55,8 +55,8 @@ pub struct AxisView {
 /// Renders picture `number` of an axis.
 ///
 /// # Errors
-/// As for [`Workcell::new`]; [`SimulationError::Configuration`] if no pose of camera or cover gives the picture that
-/// the axis requires.
+/// As for [`Workcell::new`]; [`Configuration`](crate::SimulationError::Configuration) if no pose of camera or cover
+/// gives the picture that the axis requires.
 pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut request = Request::new(spec, axis, number, seed);
     if axis == Axis::LookAlikes {
