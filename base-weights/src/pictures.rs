@@ -17,8 +17,8 @@ const LOOK_ALIKE_EVERY: usize = 2;
 
 /// Number of parts that a step tells apart.
 const GROUP: usize = 8;
-/// Number of parts adjacent in size from which these are chosen: the size, which a photo gives only roughly, must not
-/// be enough to identify a part.
+/// Number of parts adjacent in size from which a step's group is chosen: the size, which a photo gives only roughly,
+/// must not be enough to identify a part.
 const GROUP_FROM: usize = 20;
 
 /// Minimum visible fraction of a part that is a training target.

@@ -56,7 +56,7 @@ pub struct Comparison<'a> {
     pub template: &'a ShapeTemplate,
     /// The surface inside its outline.
     pub surface: &'a Surface,
-    /// Its edges over the whole area, compared in both directions.
+    /// Its edges over the whole area, compared also where only one of the two has an edge.
     pub structure: &'a Structure,
     /// The input of the likeness network.
     pub likeness: &'a Likeness,
@@ -104,7 +104,7 @@ impl Agreement {
     }
 }
 
-/// Minimum likeness for computing the details, which saves time; poses below it are refused. Chosen by hand.
+/// Minimum likeness for computing the details, which saves time; poses below it are refused anyway. Chosen by hand.
 const MIN_LIKENESS: f64 = -4.0;
 
 /// All measurements of a pose in an image, from which the caller computes a score.

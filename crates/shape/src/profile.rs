@@ -1,7 +1,7 @@
 //! The position of a part of revolution along its axis, and which end is which.
 //!
-//! In another roll the threads are shifted along the part and its light has changed, so that edges inside its outline
-//! shift a pose along the axis or turn it end for end. The profile is the same in every roll.
+//! In a roll other than the photo's the threads are shifted along the part and its light has changed, so that edges
+//! inside its outline shift a pose along the axis or turn it end for end. The profile is the same in every roll.
 
 use std::ops::RangeInclusive;
 

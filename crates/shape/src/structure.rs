@@ -17,7 +17,7 @@ use sdg_geometry::{PlanarSimilarity, Polygon};
 use crate::config::{AgreementConfig, StructureConfig};
 use crate::gradient_field::GradientField;
 
-/// How well the edges of an image agree with the demonstration's, in both directions.
+/// How well the edges of an image agree with the demonstration's, both ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureAgreement {
     /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: these

@@ -199,7 +199,7 @@ fn in_other_light(colors: &[Option<[f32; 3]>], strength: f32, rng: &mut Pcg64Mcg
                 color.map(|value| {
                     let lit = (value.max(1e-3).powf(gamma) * gain * tint[channel]).min(1.0);
                     channel += 1;
-                    // Three uniform numbers are nearly normal, with a standard deviation of 1.
+                    // The sum of three uniform numbers is nearly normal, with a standard deviation of 1.
                     let normal: f32 = (0..3).map(|_| rng.random_range(-1.0f32..1.0)).sum();
                     lit + noise * normal
                 })

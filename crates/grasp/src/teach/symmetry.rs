@@ -35,7 +35,7 @@ impl HiddenTurns {
             for keypoint in &mut object.keypoints {
                 let at = back.apply(&keypoint.point());
                 let inside = (0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y);
-                // An object that covers the part was not rotated with it, so that it is unknown whether it covers this
+                // An object in front of the part was not rotated with it; it is unknown whether the object covers this
                 // place.
                 *keypoint = match inside {
                     true => Keypoint::visible(at),

@@ -4,7 +4,8 @@
 //!
 //! Maps are channels last, so the values that a kernel row ky needs at a position are one run of Kw·C floats, and the
 //! next position's run starts stride·C later. The product has output channels as rows, (kx, c) as columns, and
-//! positions as depth. It reads everything in place; only a padded x is first copied with zeros around it.
+//! positions as depth. It reads everything in place, except that x is first copied with zeros around it if it is padded
+//! or Kw·C is not a multiple of sixteen.
 //!
 //! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 

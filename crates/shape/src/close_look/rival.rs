@@ -37,10 +37,9 @@ const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
 const MIN_RESEMBLANCE: f64 = 0.4;
 /// A rotation is compared closely if its agreement with the picture is lower than the original pose's by at most this.
 const MAX_LOSS_BY_TURN: f64 = 0.03;
-/// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
+/// Minimum extent of the differences between mirror image and photo, as a share of the photo's edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// Minimum extent of the differences from the original pose, as a share of the edges, of a rotation that replaces it.
-/// Chosen by hand.
+/// The same for a rotation that replaces the original pose, between the photo at the two poses. Chosen by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 /// Minimum gain of correlation by a rotation that replaces the pose. Chosen by hand.
 const MIN_GAIN_BY_TURN: f64 = 0.1;
