@@ -74,7 +74,7 @@ fn renamed(name: &str) -> String {
         name = name.replace(&format!("mask_head.{level}.0."), &format!("mask_head.mask_fcn.{level}."));
     }
     for layer in 0..8 {
-        // torchvision also numbers the activations between them.
+        // torchvision also numbers the activations between the convolutions.
         let theirs = format!("keypoint_head.{}.", 2 * layer);
         name = name.replace(&theirs, &format!("keypoint_head.conv_fcn.{layer}."));
     }

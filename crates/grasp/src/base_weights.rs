@@ -85,9 +85,9 @@ impl BaseWeights {
 
     /// Sets the network's parameters. Layers frozen by the preset stay frozen.
     ///
-    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1 − eps, which is the same function.
-    /// A grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less, would be
-    /// zero.
+    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1 − eps, which does not change the
+    /// function. A grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less,
+    /// would be zero.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] if a parameter has no value and is not listed as randomly initialised, or if a value

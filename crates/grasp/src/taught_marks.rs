@@ -21,7 +21,7 @@ pub struct TaughtMarks {
     /// Width and height of the photo from which the cut-out comes; `None` for a resized cut-out and in a plan view.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
-    /// The centre of that photo, in pixels of the cut-out; `None` in files without it.
+    /// The centre of that photo, in pixels of the cut-out; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo_middle: Option<[f64; 2]>,
 }

@@ -81,7 +81,7 @@ pub(crate) fn filters(
     {
         return entry.filters.clone();
     }
-    // Packed without the lock: two threads may both do it, with the same result.
+    // Packed without the lock: two threads may both pack, with the same result.
     let filters = pack();
     let mut cache = cache();
     let entries = cache.get_or_insert_default();

@@ -193,7 +193,7 @@ pub struct RefinementConfig {
     pub sure_agreement: f64,
     /// Distance in pixels between a pose whose agreement stays poor and the starts of further climbs.
     pub restart_px: f64,
-    /// Minimum agreement for further climbs: no pose below it was the part.
+    /// Minimum agreement for further climbs: no pose of lower agreement was the part.
     pub min_restart_agreement: f64,
 }
 

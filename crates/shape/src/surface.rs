@@ -1,8 +1,8 @@
 //! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! A lever with nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured; the part
-//! itself in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness
-//! and colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
+//! A lever with nearly the outline of the taught part agrees in its edges (0.71 to 0.75 was measured; the part itself
+//! in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness and
+//! colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
@@ -26,8 +26,8 @@ use crate::config::SurfaceConfig;
 use crate::lanes::{LANES, in_lanes};
 use crate::pixel_cell::PixelReader;
 
-/// Number of compared points; a few hundred are enough for correlations and take microseconds. Derived from that; it
-/// was 700 before cells were introduced.
+/// Number of compared points; a few hundred are enough for correlations and take microseconds. Derived from that; the
+/// value was 700 before cells were introduced.
 const POINTS: f64 = 900.0;
 /// Minimum number of points of a compared cell. Chosen by hand, not measured.
 const MIN_IN_CELL: usize = 4;

@@ -6,7 +6,7 @@
 //! held-out samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! One loop (run.rs) trains both; their differences are in a `Task`: batches, loss, validation.
+//! One loop (run.rs) trains both networks; their differences are in a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: the samples, their order, and every random choice of the losses. Apart from
 //! rounding by other vector instructions, it depends on the machine only if a time budget shortens it.

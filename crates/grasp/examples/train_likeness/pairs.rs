@@ -44,7 +44,7 @@ impl Pairs {
     /// No examples.
     pub const EMPTY: Self = Self { bytes: Vec::new() };
 
-    /// Generates the missing parts and searches for them; held-out parts use another seed.
+    /// Generates the missing parts and searches for them; held-out parts use another seed than training parts.
     pub fn drawn_up_to(self, parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
         let once = |condition| (SceneConfig::only(condition), 1);
         let kinds: Vec<(SceneConfig, u64)> = Condition::ALL

@@ -1,9 +1,9 @@
 //! Parts that look the same at several rotations.
 //!
 //! A sample's record contains the part's rotation, which the picture of a symmetric part does not show. A network
-//! trained on it would learn the mean of the rotations, and a validation would count correct answers as wrong.
-//! Therefore keypoints are taught at their positions for the smallest equivalent rotation, and invisible rotations are
-//! not errors.
+//! trained on this rotation would learn the mean of the rotations, and a validation would count correct answers as
+//! wrong. Therefore keypoints are taught at their positions for the smallest equivalent rotation, and invisible
+//! rotations are not errors.
 
 use nalgebra::Point2;
 use sdg_demonstration::{Demonstration, Sample};

@@ -182,8 +182,8 @@ impl Track {
         }
     }
 
-    /// Compares a search's pose with the pose by edges in that frame: a small difference corrects the following frames,
-    /// a large one is tried in the next frame.
+    /// Compares a search's pose with the pose by edges in the searched frame: a small difference corrects the following
+    /// frames, a large one is tried in the next frame.
     pub(super) fn correct(&mut self, detector: &PartDetector, past: &PastPose, found: &Placement) {
         let difference = past.by_edges.inverse().compose(&found.image_from_cutout);
         let middle = self.part.demonstration(detector).marks.bbox.center();
@@ -348,7 +348,7 @@ impl Track {
         self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
     }
 
-    /// The track's pose in a frame, if it was followed in it.
+    /// The track's pose in a frame, if it was followed there.
     pub(super) fn past_pose(&self, number: u64) -> Option<PastPose> {
         let idx = self.history.binary_search_by_key(&number, |past| past.number).ok()?;
         self.history.get(idx).copied()

@@ -43,7 +43,7 @@ const MIN_SHARE: f64 = 0.03;
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 /// Minimum gain of correlation by a rotation that replaces the pose. Chosen by hand.
 const MIN_GAIN_BY_TURN: f64 = 0.1;
-/// A window differs if the edges of the two pictures in it correlate by less than this.
+/// A window differs if the edges of photo and rival in it correlate by less than this.
 const SAME: f32 = 0.6;
 
 /// The poses, from the template's own pixels to the cut-out's, at which `template` resembles the photo most. They are

@@ -432,7 +432,7 @@ impl ShapeSearch {
     fn range_about(&self, pose: Pose) -> CaptureRange {
         let [least, largest] = [self.config.scales.start().ln(), self.config.scales.end().ln()];
         let turn = FOLLOW_STEPS * self.bank.angle_step_rad;
-        // A change of ln scale moves edges as far as the same angle does.
+        // A change of ln scale moves edges as far as a rotation by as many radians.
         let (low, high) = ((pose.log_scale - turn).max(least), (pose.log_scale + turn).min(largest));
         let shift = FOLLOW_PLACES * self.place_pitch();
         CaptureRange::around(Pose { log_scale: 0.5 * (low + high), ..pose }, [shift, shift, turn, 0.5 * (high - low)])
