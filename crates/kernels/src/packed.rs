@@ -1,4 +1,4 @@
-//! Packed weights, kept as long as the weights from which they were packed exist.
+//! Packed weights, reused as long as the weights from which they were packed exist.
 //!
 //! In inference a network's weights never change, so they are packed on first use. An entry is found by the address of
 //! the weight's storage and holds a weak reference to it: the address cannot be given to another tensor while the
