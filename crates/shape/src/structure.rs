@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn what_covers_a_part_of_it_is_not_visible() {
-        // A bright sheet with a dark line across it lies over the right half.
+        // A bright sheet with dark stripes lies over the right half.
         let covered = RgbImage::from_fn(200, 140, |x, y| match (x, y) {
             (90.., _) if (x + 2 * y) % 40 < 20 => Rgb([230; 3]),
             (90.., _) => Rgb([30; 3]),

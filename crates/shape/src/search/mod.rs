@@ -101,7 +101,7 @@ pub struct Match {
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
-    /// All measurements in the image at that place.
+    /// All measurements in the image at this pose.
     pub evidence: Evidence,
 }
 
