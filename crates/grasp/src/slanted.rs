@@ -18,7 +18,7 @@ use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usu
 
 /// Maximum number of places used, best first. Chosen by hand to save time.
 const NUM_SLANT_PLACES: usize = 4;
-/// Minimum agreement of these places. Chosen by hand to save time.
+/// Minimum agreement of a used place. Chosen by hand to save time.
 const MIN_AGREEMENT: f64 = 0.25;
 /// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;

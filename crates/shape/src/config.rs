@@ -114,7 +114,8 @@ pub struct SurfaceConfig {
     /// Contrast below this, in grey values, is noise: a surface without contrast agrees with nothing. Chosen by
     /// hand, not measured.
     pub noise: f64,
-    /// The same within a cell, where contrast is lower than over the surface. Chosen by hand, not measured.
+    /// The contrast of noise within a cell, where contrast is lower than over the surface. Chosen by hand, not
+    /// measured.
     pub noise_in_cell: f64,
 }
 

@@ -37,7 +37,7 @@ pub struct Foreshortening {
     pub direction: Angle,
     /// The share of edge points on a crest of the image, in `[0, 1]`.
     pub consensus: f64,
-    /// The same at the pose without shortening.
+    /// The share of edge points on a crest at the pose without shortening, in `[0, 1]`.
     pub level_consensus: f64,
 }
 

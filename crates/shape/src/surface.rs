@@ -154,7 +154,7 @@ impl Surface {
         self.points().filter(|point| is_inside(point)).count() as f64 / self.points().count() as f64
     }
 
-    /// The same share, estimated from a sixteenth of the points.
+    /// The share of the points in `outline`, estimated from a sixteenth of the points.
     pub(crate) fn share_inside_roughly(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
         let is_inside = inside(outline, outline_from_cutout);
         let points = || self.points().step_by(16);

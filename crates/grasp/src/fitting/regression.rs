@@ -245,7 +245,7 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The same score with other neutral values: half-way between the medians of correct and wrong poses, so that a
+/// The score of `config` with other neutral values: half-way between the medians of correct and wrong poses, so that a
 /// positive contribution supports the part; for resemblance the median of all; for size and outside 0, their best
 /// value; for the terms from details on, an end of the range.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {

@@ -33,7 +33,7 @@ const POOR_SHARE: f64 = 0.85;
 /// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences indicate
 /// another place. In pixels of the cut-out; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
-/// The same limit for the rotation, in radians. Chosen by hand.
+/// Maximum difference in rotation that is a correction, in radians. Chosen by hand.
 const MAX_CORRECTION_RAD: f64 = 0.06;
 /// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;

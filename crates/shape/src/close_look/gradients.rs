@@ -38,7 +38,7 @@ pub(super) struct Gradients {
     signed: [Vec<f32>; 2],
     /// x and y of `v` at twice its angle.
     doubled: [Vec<f32>; 2],
-    /// Squared lengths of `v`, the same at twice its angle.
+    /// Squared lengths of `v`; doubling the angle does not change them.
     energy: Vec<f32>,
 }
 

@@ -23,7 +23,7 @@ use crate::template::ShapeTemplate;
 
 /// Number of angles at which the rival is laid over the photo.
 const NUM_TURNS: usize = 36;
-/// Number of the best of these poses that are followed to the agreement's level.
+/// Number of the best poses of the rival that are followed to the agreement's level.
 const NUM_FOLLOWED: usize = 14;
 /// Number of the best followed poses that are tried in pictures.
 const NUM_STARTS: usize = 4;
@@ -39,7 +39,8 @@ const MIN_RESEMBLANCE: f64 = 0.4;
 const MAX_LOSS_BY_TURN: f64 = 0.03;
 /// Minimum extent of the differences between mirror image and photo, as a share of the photo's edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// The same for a rotation that replaces the original pose, between the photo at the two poses. Chosen by hand.
+/// Minimum extent of the differences between the photo at the original pose and at a rotation that replaces it. Chosen
+/// by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 /// Minimum gain of correlation by a rotation that replaces the pose. Chosen by hand.
 const MIN_GAIN_BY_TURN: f64 = 0.1;

@@ -157,13 +157,13 @@ const MIN_RESPONSE: f64 = 0.2;
 /// Largest distance of a climb from its start, in places. Slightly more than the distance of the next start. Derived
 /// from this distance, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
-/// The same in angle and ln scale, in steps of angle.
+/// Largest distance of a climb from its start in angle and ln scale, in steps of angle.
 const FOLLOW_STEPS: f64 = 1.5;
 /// Largest number of matches below `sure_agreement` that are refined again. Chosen by hand, not measured: more take
 /// more time.
 const MAX_NUM_POLISHED: usize = 16;
-/// Number of the best of these matches that are refined again even if probably not the part. Chosen by hand, not
-/// measured.
+/// Number of the best matches below `sure_agreement` that are refined again even if probably not the part. Chosen by
+/// hand, not measured.
 const MIN_NUM_POLISHED: usize = 3;
 /// Largest fraction of the part's area in which two matches may overlap. Chosen by hand, not measured.
 const MAX_OVERLAP: f64 = 0.3;
