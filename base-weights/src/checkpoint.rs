@@ -22,7 +22,7 @@ pub struct Checkpoint<S> {
     pub step: usize,
     /// The network's parameters.
     pub parameters: StateDict,
-    /// The optimiser's state between steps; empty where each episode has its own optimiser.
+    /// The optimiser's state between steps.
     pub optimizer: AdamWState,
 }
 

@@ -38,7 +38,7 @@ pub struct Trial {
     look_alikes: Vec<Sample>,
 }
 
-/// Pictures as the wrist camera takes them: from the height of the photo, with a small amount of every variation.
+/// Pictures as the wrist camera takes them: from about the height of the photo, with small variations.
 fn scene_config() -> SceneConfig {
     SceneConfig {
         photo: PhotoConfig { fill: [0.14, 0.42], ..PhotoConfig::default() },

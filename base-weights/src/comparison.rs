@@ -212,7 +212,7 @@ impl Asked<'_> {
         near.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, Angle::from_degrees(turn), scale))
     }
 
-    /// Another part's demonstration as a network would align it with this one: at the angle at which it fills the box
+    /// Another part's demonstration as a network would align it with `instance`: at the angle at which it fills the box
     /// best, or at a random angle.
     fn fitted(&mut self, other: &Shown, nominal: &PlanarSimilarity, instance: &Instance) -> PlanarSimilarity {
         let first: f64 = self.rng.random_range(0.0..360.0);

@@ -9,7 +9,7 @@
 //!                                 └ recall and false alarms of the network alone (`compare`)
 //! ```
 //!
-//! A run is a function of its seed: picture *i* is always the same, and a checkpoint holds everything that the next
+//! A run is a function of its settings: picture *i* is always the same, and a checkpoint holds everything that the next
 //! step needs. A run that was stopped and resumed gives the same bits as one that was not.
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]

@@ -247,7 +247,7 @@ impl PretrainNetwork {
     }
 }
 
-/// The same ROI with every part as the first class.
+/// The ROI, with the first class if it is on a part.
 fn any_part(sampled: &SampledRoi) -> SampledRoi {
     let class = match sampled.class {
         RoiClass::Object { gt_idx, .. } => RoiClass::Object { class_idx: 0, gt_idx },

@@ -12,13 +12,13 @@ use sdg_part_generator::{
     DemonstrationPhoto, LookAlike, MixedInstance, MixedSample, Part, PhotoConfig, SceneConfig, Scenes,
 };
 
-/// Every second part is a look-alike of the part before it, so the network must learn to tell them apart.
+/// Every second part is, if possible, a look-alike of the part before it, so the network must learn to tell them apart.
 const LOOK_ALIKE_EVERY: usize = 2;
 
 /// Number of parts that a step tells apart.
 const GROUP: usize = 8;
-/// Number of parts adjacent in size from which these are chosen: the size, which a photo gives only roughly, must not
-/// be enough to identify a part.
+/// Number of parts adjacent in size from which a step's group is chosen: the size, which a photo gives only roughly,
+/// must not be enough to identify a part.
 const GROUP_FROM: usize = 20;
 
 /// Minimum visible fraction of a part that is a training target.
@@ -33,7 +33,7 @@ pub fn scene_config() -> SceneConfig {
         photo: PhotoConfig { fill: [0.12, 0.45], ..PhotoConfig::default() },
         absent_share: 0.0,
         instances: [4, 9],
-        // Every part in the picture is labelled; only tables and covers are background.
+        // No other parts, which would be unlabelled: only tables and covers are background.
         others: [0, 0],
         look_alike_share: 0.0,
         num_other_parts: 0,
@@ -125,7 +125,7 @@ impl Pictures {
     }
 }
 
-/// Generates the parts of a seed: pairs of a part and its look-alike.
+/// Generates the parts of a seed: pairs of a part and, if possible, its look-alike.
 pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
     let first = FIRST_PART_SEED.wrapping_add(seed.wrapping_mul(1_000_000));
     let mut parts: Vec<Part> = Vec::with_capacity(num_parts);

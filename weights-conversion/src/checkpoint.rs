@@ -11,8 +11,8 @@ use crate::source::{Source, Span};
 use crate::tensor::StoredTensor;
 use crate::torch::{self, Storages};
 
-/// Keys of the state dict in checkpoints that also contain the optimiser's state and counters: Detectron2 and
-/// torchvision, others, Caffe2.
+/// Keys of the state dict in checkpoints that also contain the optimiser's state and counters, by writer: Detectron2
+/// and torchvision; other trainers; Caffe2.
 const STATE_DICT_KEYS: [&str; 3] = ["model", "state_dict", "blobs"];
 
 /// A file's format, recognised by its content.

@@ -2,7 +2,7 @@
 
 use std::io;
 
-/// The reason why a checkpoint could not be read or converted. Each message gives the expected and the found value.
+/// The reason why a checkpoint could not be read or converted. Most messages give the expected and the found value.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]

@@ -7,9 +7,9 @@
 //! Checkpoint + Architecture ─ naming scheme ─ Conversion: a tensor for each parameter, and a Report ─ write ─ safetensors
 //! ```
 //!
-//! Values stay in the file until they are written, so that a conversion needs the memory of one layer.
-//! Checkpoints are programs for Python's pickle machine and may be hostile: this crate emulates the few functions
-//! that weights need, refuses every other by name, and checks every size before it allocates memory.
+//! Values stay in the file until they are written, so that a conversion needs the memory of one layer. A pickled
+//! checkpoint is a program for Python's pickle machine and may be hostile: this crate emulates the few functions that
+//! weights need, refuses every other by name, and checks every size before it allocates memory.
 //!
 //! Not included: running the network (`sdg weights verify` does this), downloads, torch's pre-2017 tar files,
 //! compressed zips.

@@ -37,8 +37,8 @@ pub struct View {
 }
 
 impl View {
-    /// The differences of the two images on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and
-    /// the fraction of each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
+    /// The differences of the two images on the part, `[DIFFERENCES, M, M]`: three colours, three normalised colours,
+    /// and the fraction of each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
     pub fn differences(&self) -> &[f32] {
         &self.differences
     }

@@ -1,4 +1,4 @@
-//! The configuration of a detector: every setting in which R-CNN implementations differ.
+//! The configuration of a detector, with the settings in which R-CNN implementations differ.
 //!
 //! Each enum names a choice that a bare bool or number would hide; the two values of most choices are Detectron2's and
 //! torchvision's. A configuration is plain data that can be serialised, so a model file can contain the configuration

@@ -11,7 +11,7 @@ fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString)
 }
 
 impl RcnnConfig {
-    /// Checks that every value is valid, and that values that depend on each other agree.
+    /// Checks the ranges of values, and that values that depend on each other agree.
     ///
     /// # Errors
     /// [`DetectionError::Config`] names the first invalid field.

@@ -9,9 +9,9 @@
 //!   ─ Detections in pixels of the original image
 //! ```
 //!
-//! Every setting in which Detectron2 and torchvision differ is a value of [`RcnnConfig`]; the
-//! [`presets`] set them. The network runs on the device; anchors, matching, sampling, decoding and
-//! NMS run on the host in plain Rust, because they are small. Everything random takes a seed.
+//! The settings in which Detectron2 and torchvision differ are values of [`RcnnConfig`]; the [`presets`] set them. The
+//! network runs on the device; anchors, matching, sampling, decoding and NMS run on the host in plain Rust, because
+//! they are small. Everything random takes a seed.
 //!
 //! Elsewhere: files, threads and clocks; the optimiser and its schedule (crate `training`); image
 //! augmentation (crate `demonstration`).

@@ -5,8 +5,7 @@ use image::RgbImage;
 /// Fraction bits of Pillow's fixed-point filter coefficients.
 const PRECISION_BITS: u32 = 22;
 
-/// One output position of a separable filter: the first input and the weights of it and the
-/// following inputs.
+/// One output position of a separable filter: its first input, and the weights from this input on.
 struct Taps {
     first: usize,
     weights: Vec<i32>,

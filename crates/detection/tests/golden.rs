@@ -74,7 +74,7 @@ fn renamed(name: &str) -> String {
         name = name.replace(&format!("mask_head.{level}.0."), &format!("mask_head.mask_fcn.{level}."));
     }
     for layer in 0..8 {
-        // torchvision also numbers the activations between them.
+        // torchvision also numbers the activations between the convolutions.
         let theirs = format!("keypoint_head.{}.", 2 * layer);
         name = name.replace(&theirs, &format!("keypoint_head.conv_fcn.{layer}."));
     }
@@ -145,8 +145,9 @@ fn torchvision_mask_agrees_at_every_stage() {
 ///
 /// In a whole network, some of the millions of activations are so near zero that rounding decides whether a ReLU passes
 /// their gradient. So torch's own single precision differs by up to 1.65e-3 from its double precision (after the
-/// keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two differ by 1.7e-3. Therefore both
-/// are compared with double precision: ours must be within this bound, or at least as close as torch's.
+/// keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two single precisions differ by
+/// 1.7e-3. Therefore both are compared with double precision: ours must be within this bound, or at least as close as
+/// torch's.
 const WHOLE_GRADIENTS: f64 = 1e-3;
 
 /// The maximum difference, relative to the largest expected magnitude.

@@ -2,7 +2,7 @@
 //! [SEED]`.
 //!
 //! Teaches each of PARTS (100) generated parts and searches PICTURES (25) of 640×480 pixels with other objects but no
-//! look-alikes under each of four conditions. SEED (4041) decides the parts; nothing was fitted on parts of that seed.
+//! look-alikes under each of four conditions. SEED (4041) decides the parts; nothing was fitted on parts of seed 4041.
 //! The same arguments give the same output.
 
 mod drawn;

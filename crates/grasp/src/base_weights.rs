@@ -85,9 +85,9 @@ impl BaseWeights {
 
     /// Sets the network's parameters. Layers frozen by the preset stay frozen.
     ///
-    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1 − eps, which is the same function.
-    /// A grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less, would be
-    /// zero.
+    /// Frozen norms are converted to a scale and a shift, with mean 0 and variance 1 − eps, which does not change the
+    /// function. A grasp model is stored in half precision, where the variance of an inactive channel, 1e-10 or less,
+    /// would be zero.
     ///
     /// # Errors
     /// [`GraspError::BaseWeights`] if a parameter has no value and is not listed as randomly initialised, or if a value
@@ -123,7 +123,7 @@ impl BaseWeights {
     }
 }
 
-/// `(x - mean) / sqrt(variance + eps) * weight + bias` as `x * scale + shift`, under the names of the four.
+/// `(x - mean) / sqrt(variance + eps) * weight + bias` as `x * scale + shift`, under the same four names.
 fn folded(norm: [&WeightTensor; 4], eps: f64) -> [WeightTensor; 4] {
     let [weight, bias, mean, variance] = norm;
     let count = weight.values.len();
@@ -211,7 +211,7 @@ mod tests {
         let [scale, shift, mean, variance] = folded(norm.each_ref(), 1e-5);
         // (x - 2) / 2 * 3 + 0.5 = 1.5 x - 2.5
         assert!((scale.values[0] - 1.5).abs() < 1e-6 && (shift.values[0] + 2.5).abs() < 1e-6);
-        // Only the scale of an inactive channel remains, because half precision cannot hold its variance.
+        // An inactive channel keeps only its scale, because half precision cannot hold its variance.
         assert!((scale.values[1] / 3.162e-6 - 1.0).abs() < 1e-3, "{}", scale.values[1]);
         assert_eq!((mean.values, variance.values), (vec![0.0; 2], vec![1.0 - 1e-5; 2]));
     }

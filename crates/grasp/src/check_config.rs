@@ -101,7 +101,7 @@ pub struct Term {
 ///
 /// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
 /// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
-/// hue, size and bias were set by hand; with these ranges only details, table, added and mirror reject a pose alone,
+/// hue, size and bias were set by hand; with these ranges only details, table, added and mirror can each reject a pose
 /// regardless of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing
 /// proposal counts, because a network also proposes look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +142,7 @@ pub struct ScoreConfig {
     pub added: Term,
     /// Term of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Term of ln of the likelihood of the network's score on the part over its likelihood elsewhere.
+    /// Term of the log-likelihood ratio of the network's score, on the part over elsewhere.
     pub network: Term,
 }
 

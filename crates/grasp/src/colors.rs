@@ -14,7 +14,7 @@ pub(crate) enum Colors {
 impl Colors {
     /// Decides by the pixels: without colours, the three values of a pixel are equal up to rounding.
     pub(crate) fn of(image: &RgbImage) -> Self {
-        /// The difference that JPEG's colour conversion leaves in a grey pixel.
+        /// Maximum difference that JPEG's colour conversion leaves in a grey pixel.
         const ROUNDING: u8 = 2;
         let is_gray = |[r, g, b]: [u8; 3]| r.max(g).max(b) - r.min(g).min(b) <= ROUNDING;
         if image.pixels().all(|pixel| is_gray(pixel.0)) { Self::None } else { Self::There }

@@ -5,9 +5,9 @@
 //! ```text
 //! shift = η · (position − centre, in the picture) − the same in the photo        η = height / (distance − height)
 //! ```
-//! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture at the shifts that the
-//! possible η give, which form a line, and, since no camera points exactly down, also beside this line. A shift is
-//! accepted if its agreement is clearly better than that of the outline's pose. Fitted on the tuned sets of
+//! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture at the shifts of all
+//! possible η, which form a line. Since no camera points exactly down, shifts beside this line are also compared. A
+//! shift is accepted if its agreement is clearly better than that of the outline's pose. Fitted on the tuned sets of
 //! datasets/split.toml and base-weights/physical/split.toml: the marks of 304 of 312 parts lie within 4 % of the
 //! diagonal, and those of 268 without a shift (docs/decisions/027-heights-and-slants.md).
 
@@ -144,11 +144,12 @@ pub(crate) struct Straightened {
 }
 
 impl MarksShift {
-    /// The picture around the part, with the marks' surroundings moved back from their position by `image_from_marks`.
-    /// The flanks of the raised area are moved by a shift that decreases from its top to its foot.
+    /// The picture around the part, with the marks' surroundings moved from `image_from_marks` back to the outline's
+    /// pose. The flanks of the raised area are moved by a shift that decreases from its top to its foot.
     ///
     /// # Units and frames
-    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that the pyramids are equal.
+    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that its pyramid has the picture's
+    /// pixels.
     pub(crate) fn straightened(
         &self,
         image: &RgbImage,

@@ -254,7 +254,8 @@ impl GraspModel {
         Ok(level)
     }
 
-    /// Detections in an image taken as level, and the slant suggested by the best matches if `suggest` is set.
+    /// Detections in an image as if the camera were level, and the slant suggested by the best matches if `suggest` is
+    /// set.
     async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Option<Slant>)> {
         let search = || {
             let searched = SearchedImage::of(image, shot, &self.demonstrations);
@@ -354,7 +355,7 @@ fn max_matches(max_detections: usize, is_cut: bool) -> usize {
 
 /// Keeps the best of several detections of the same part, which is recognised by the overlap of outlines or, without
 /// outlines, of boxes. Of detections that converged to the same pose, the one with the highest network score is kept,
-/// so that the result does not depend on the last bit.
+/// so that the result does not depend on the last bits of the scores.
 fn drop_repeated(found: &mut Vec<Found>) {
     // Chosen by hand: above the rounding of single precision, below any difference that distinguishes poses.
     const SAME_SCORE: f64 = 1e-4;

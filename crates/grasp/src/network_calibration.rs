@@ -24,10 +24,10 @@ pub struct NetworkCalibration {
 
 /// Scores are clamped to this distance from 0 and 1.
 const MIN_PROBABILITY: f64 = 1e-4;
-/// Minimum spread of the scores on one side, in log-odds, because a few equal scores predict little about later ones.
-/// Derived from that, not measured.
+/// Minimum spread of the correct or of the wrong scores, in log-odds, because a few equal scores predict little about
+/// later ones. Derived from this reason, not measured.
 const MIN_SPREAD: f64 = 0.3;
-/// The percentile, on the side towards the other scores, that measures the spread.
+/// The percentile that measures the spread: from below for correct scores, from above for wrong ones.
 const FACING_PERCENT: f64 = 10.0;
 /// Distance of this percentile of a normal distribution from the median, in standard deviations.
 const FACING_DEVIATIONS: f64 = 1.281_551_6;
@@ -35,7 +35,8 @@ const FACING_DEVIATIONS: f64 = 1.281_551_6;
 /// median of the correct ones. With normal distributions, 5 % of the wrong scores are accepted when 10 % of the correct
 /// ones are refused (1.645 over 1.282).
 const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
-/// Bounds of the slope, so that a few scores give neither a step nor a flat line. Derived from that, not measured.
+/// Bounds of the slope, so that a few scores give neither a step nor a flat line. Derived from this reason, not
+/// measured.
 const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
 
 /// The log-odds of a raw score.

@@ -9,7 +9,7 @@ use crate::GraspError;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPlane {
     /// Height of the marks' plane in the base frame, in metres. The original uses the table's height and therefore has
-    /// a parallax error: 11 mm for a part of 40 mm, 150 px off the axis.
+    /// a parallax error: 11 mm for marks 40 mm high, 150 px off the axis.
     pub mark_height_m: f64,
     /// Height of the gripper's centre point when it closes, in the base frame, in metres.
     pub grasp_height_m: f64,

@@ -3,8 +3,8 @@
 //! The outline of a screw that lies on its side is at the height of the axis; the marks are on the upper side, higher
 //! by the radius at the marks. This height determines their shift in a camera's picture. The surroundings of the marks
 //! differ with the roll about the axis and carry no information. If the part lies in the same roll as in the photo,
-//! edges on its upper side also agree and shift the pose from the outline towards the marks; how far is measured with
-//! the outline alone.
+//! edges on its upper side also agree and shift the pose from the outline towards the marks; this shift is measured
+//! with the outline alone.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::PlanarSimilarity;

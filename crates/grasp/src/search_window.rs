@@ -3,8 +3,8 @@
 //! ```text
 //! picture ─ region ─ region and a margin, cut out ─ searched ─ detections in pixels of the picture ─ those that lie in the region
 //! ```
-//! The margin is half the part's length, so that parts that extend beyond the region are complete in the window. Pixels
-//! beyond the margin are not read.
+//! The margin is half the part's length, so that parts with half of their area in the region are usually complete in
+//! the window. Pixels beyond the margin are not read.
 
 use image::RgbImage;
 use nalgebra::Point2;
@@ -18,8 +18,8 @@ use crate::taught::TaughtDemonstration;
 use crate::verification::Shot;
 use sdg_shape::PixelRect;
 
-/// Margin of the window around the region, in lengths of the part: the maximum extent beyond the region of a part with
-/// half of its area inside.
+/// Margin of the window around the region, in lengths of the part: the maximum extent beyond the region of a part of
+/// constant width with half of its area inside.
 const MARGIN: f64 = 0.5;
 /// Additional margin in pixels, for the smoothing of the gradients. Chosen by hand.
 const BORDER_PX: f64 = 4.0;

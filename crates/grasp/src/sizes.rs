@@ -1,9 +1,9 @@
 //! The possible sizes of a part in a picture of an uncalibrated camera.
 //!
 //! A photo and a picture may have different numbers of pixels because one was resized or cropped. The files do not
-//! record which, so both hypotheses are tried: **same pixels**, a part covers as many pixels as in its photo, and
-//! **same frame**, it covers the same fraction of the picture. Around each hypothesis, sizes vary within the model's
-//! tolerance.
+//! record which of the two happened, so both hypotheses are tried: **same pixels**, a part covers as many pixels as in
+//! its photo, and **same frame**, it covers the same fraction of the picture. Around each hypothesis, sizes vary within
+//! the model's tolerance.
 
 use std::ops::RangeInclusive;
 

@@ -18,7 +18,7 @@ use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usu
 
 /// Maximum number of places used, best first. Chosen by hand to save time.
 const NUM_SLANT_PLACES: usize = 4;
-/// Minimum agreement of these places. Chosen by hand to save time.
+/// Minimum agreement of a used place. Chosen by hand to save time.
 const MIN_AGREEMENT: f64 = 0.25;
 /// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
 const MIN_CONSENSUS: f64 = 0.3;
@@ -43,7 +43,7 @@ const MAX_REACH: f64 = 0.75;
 const MARGIN: f64 = 0.2;
 
 /// Whether the detections in the rectified picture explain more than those in the picture itself. Scores cannot decide
-/// this: they are equally high for a pose with a small error.
+/// this: a slightly wrong pose scores as high as the right one.
 pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     fn accepted(found: &[Found]) -> impl Iterator<Item = &GraspDetection> {
         found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted())
@@ -193,7 +193,8 @@ impl LevelImage {
         Some(self.taken.below_camera + seen)
     }
 
-    /// Maps a detection of the level picture to the slanted one; `None` if too little of it lies inside.
+    /// Maps a detection of the level picture to the slanted one; `None` if too little of the detection lies in the
+    /// picture.
     pub(crate) fn seen(&self, found: Found) -> Option<Found> {
         let Found { detection, placement } = found;
         let points = |all: &[Point2<f64>]| all.iter().map(|point| self.point(point)).collect::<Option<Vec<_>>>();

@@ -18,10 +18,10 @@ pub struct TaughtMarks {
     pub outline: Option<Polygon>,
     /// The part's width between the jaws: as marked, or measured across the outline.
     pub width_px: f64,
-    /// Width and height of the photo from which the cut-out comes; `None` if the cut-out was resized since.
+    /// Width and height of the photo from which the cut-out comes; `None` for a resized cut-out and in a plan view.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
-    /// The centre of that photo, in pixels of the cut-out; `None` in files without it.
+    /// The centre of that photo, in pixels of the cut-out; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo_middle: Option<[f64; 2]>,
 }

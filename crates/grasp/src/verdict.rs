@@ -10,9 +10,9 @@
 //! ```
 //! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
 //! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
-//! other evidence supports is accepted. Only these contradictions reject it alone: bare table where the part should be,
-//! more edges than the part has, a better fit of its mirror image, clearly different details and, if the size is known,
-//! another size. The weights come from a logistic regression on generated parts ([`crate::fitting`]).
+//! other evidence supports is accepted. Only these contradictions can each reject it alone: bare table where the part
+//! should be, more edges than the part has, a better fit of its mirror image, clearly different details and, if the
+//! size is known, another size. The weights come from a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -128,8 +128,8 @@ pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// ln of the likelihood of the network's score on the part over its likelihood elsewhere; `None` if the network was
-    /// not evaluated.
+    /// Log-likelihood ratio of the network's score, on the part over elsewhere; `None` if the network was not
+    /// evaluated.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,

@@ -19,7 +19,7 @@ fn time(operation: impl Fn(Tensor<4>, Tensor<4>) -> Tensor<4>, x: [usize; 4], we
         let start = Instant::now();
         let output = operation(x.clone(), weight.clone());
         best[0] = best[0].min(start.elapsed().as_secs_f64());
-        // The loss costs little compared with the convolution, and is the same for both.
+        // The loss costs little compared with the convolution, and is the same for both implementations.
         let loss = output.sum();
         let start = Instant::now();
         let grads = loss.backward();

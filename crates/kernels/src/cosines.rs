@@ -1,8 +1,8 @@
 //! Cosines between each cell of a map and the neighbouring cells of another: the correlation by which two views are
 //! compared.
 //!
-//! Composed of tensor operations, every relative shift of the two maps writes all their products and reads them again
-//! for summation. Here a row of sums stays in registers.
+//! If the correlation were composed of tensor operations, each shift of one map would write all products and read them
+//! again for summation. Here a row of sums stays in registers.
 //!
 //! Legend: C channels of a map of H × W cells, reach r; a shift is (dy, dx) from (−r, −r) to (r, r), row by row.
 

@@ -1,4 +1,4 @@
-//! Packed weights, kept as long as the weights from which they were packed exist.
+//! Packed weights, reused as long as the weights from which they were packed exist.
 //!
 //! In inference a network's weights never change, so they are packed on first use. An entry is found by the address of
 //! the weight's storage and holds a weak reference to it: the address cannot be given to another tensor while the
@@ -81,7 +81,7 @@ pub(crate) fn filters(
     {
         return entry.filters.clone();
     }
-    // Packed without the lock: two threads may both do it, with the same result.
+    // Packed without the lock: two threads may both pack, with the same result.
     let filters = pack();
     let mut cache = cache();
     let entries = cache.get_or_insert_default();

@@ -11,7 +11,7 @@ pub(crate) use transpose::transpose;
 
 /// Compiles a plain loop for every instruction set and selects one when called, with the set as first argument.
 ///
-/// Nothing is fused or reordered: the result is bit-identical on all of them.
+/// Nothing is fused or reordered: the result is bit-identical on all sets.
 macro_rules! widest {
     (fn $name:ident($($arg:ident: $kind:ty),* $(,)?) -> $result:ty $body:block) => {
         #[allow(clippy::unused_unit)] // The macro names every result, also `()`.

@@ -1,7 +1,7 @@
 //! Compares the operations except `cosines` and `log_softmax`, forwards and backwards, on every device of the build
 //! with `Flex`.
 //!
-//! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
+//! Requires the features of the devices: `make test-wgpu`, `make test-ndarray`.
 #![cfg(any(feature = "ndarray", feature = "wgpu", feature = "cuda"))]
 #![allow(clippy::unwrap_used)]
 

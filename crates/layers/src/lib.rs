@@ -1,4 +1,4 @@
-//! The building blocks of every network: layers, the initial values of their parameters, and parameters by name.
+//! The building blocks of the networks: layers, the initial values of their parameters, and parameters by name.
 //!
 //! ```text
 //! seed ─ Initializer ─ layers of a network ─ state_dict::export ─ names and values ─ file

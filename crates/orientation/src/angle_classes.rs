@@ -133,7 +133,7 @@ mod tests {
     const DEGREES: AngleClasses = AngleClasses { num_classes: 360, symmetry: 1 };
     const SOFT: Labels = Labels::VonMises { sigma_classes: 4.0 };
 
-    /// Rounding error of f32 targets, and of the tails that the window truncates.
+    /// Error by the rounding of f32 targets, and by the tails that the window truncates.
     const READOUT_TOLERANCE_DEGREES: f64 = 1e-3;
 
     #[test]

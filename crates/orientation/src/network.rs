@@ -247,7 +247,8 @@ mod tests {
 
     #[test]
     fn four_quarter_turns_make_the_reading_turn_with_the_crop() {
-        // An untrained network gives arbitrary angles, but all four rotations of a crop give the same four angles.
+        // An untrained network gives arbitrary angles, but a crop rotated by 90° is evaluated at the same four
+        // rotations.
         let network = tiny(true);
         let straight = network.predict(&pattern()).unwrap().angle;
         let clockwise = network.predict(&rotate90(&pattern())).unwrap().angle;

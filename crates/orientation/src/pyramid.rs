@@ -83,7 +83,7 @@ mod tests {
             let mean = differences.sum::<f64>() / exact.as_raw().len() as f64;
             assert!(mean <= within, "{side}: {mean}");
         }
-        // The image is too small to be halved this often; beyond it the colour is the mean colour.
+        // The image is too small to be halved this often; beyond its border the colour is the mean colour.
         let tiny = RgbImage::new(3, 2);
         let window = CropWindow { center: Point2::new(1.0, 1.0), side: 900.0, turn: Angle::ZERO };
         assert_eq!(Pyramid::new(&tiny).read(&window, 2).dimensions(), (2, 2));

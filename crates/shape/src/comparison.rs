@@ -7,12 +7,12 @@
 //!                     └─ still poor: climbed from six poses around it ─ refined by edges, kept where both still agree
 //! ```
 //! The edges alone place a part to a fraction of a pixel, but may match the wrong edges: a pipe is shifted along itself
-//! until one flank lies on its shadow. There both agreements are low, but refinement by edges decides by the consensus
-//! of crests. Such poses are therefore refined by edges and surface together, from the result and from the start. On
-//! 480 pictures of eight parts, 960 refinements were started some pixels off: by edges alone, 25 ended beside the part
-//! and 60 had an error above 3 px; with the further refinement, 0 and 7. The first percentile of the agreement of right
-//! poses, which differs by part, was 0.32 to 0.59 and is now 0.49 to 0.62. The highest agreement of a wrong pose rose
-//! from 0.48 to 0.56.
+//! until one flank lies on its shadow. There the agreements of edges and surface are low, but refinement by edges
+//! decides by the consensus of crests. Such poses are therefore refined by edges and surface together, from the result
+//! and from the start. On 480 pictures of eight parts, 960 refinements were started some pixels off: by edges alone, 25
+//! ended beside the part and 60 had an error above 3 px; with the further refinement, 0 and 7. The first percentile of
+//! the agreement of right poses, which differs by part, was 0.32 to 0.59 and is now 0.49 to 0.62. The highest agreement
+//! of a wrong pose rose from 0.48 to 0.56.
 
 use std::ops::RangeInclusive;
 
@@ -56,7 +56,7 @@ pub struct Comparison<'a> {
     pub template: &'a ShapeTemplate,
     /// The surface inside its outline.
     pub surface: &'a Surface,
-    /// Its edges over the whole area, compared in both directions.
+    /// Its edges over the whole area, compared also where only one of the two has an edge.
     pub structure: &'a Structure,
     /// The input of the likeness network.
     pub likeness: &'a Likeness,
@@ -104,7 +104,7 @@ impl Agreement {
     }
 }
 
-/// Minimum likeness for computing the details, which saves time; poses below it are refused. Chosen by hand.
+/// Minimum likeness for computing the details, which saves time; poses below it are refused anyway. Chosen by hand.
 const MIN_LIKENESS: f64 = -4.0;
 
 /// All measurements of a pose in an image, from which the caller computes a score.
@@ -156,8 +156,8 @@ impl Comparison<'_> {
     }
 
     /// `pose`, or the pose of another rotation at which the part resembles itself, if the distinguishing features
-    /// favour that. For a part of revolution, `pose` with the position along the axis and the direction of the axis
-    /// found from the profile. Scales stay in `scales`.
+    /// favour that pose. For a part of revolution, `pose` with the position along the axis and the direction of the
+    /// axis found from the profile. Scales stay in `scales`.
     pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
         if self.agreement(pose).both() < MIN_TURN_AGREEMENT {
             return *pose;

@@ -114,7 +114,8 @@ pub struct SurfaceConfig {
     /// Contrast below this, in grey values, is noise: a surface without contrast agrees with nothing. Chosen by
     /// hand, not measured.
     pub noise: f64,
-    /// The same within a cell, where contrast is lower. Chosen by hand, not measured.
+    /// The contrast of noise within a cell, where contrast is lower than over the surface. Chosen by hand, not
+    /// measured.
     pub noise_in_cell: f64,
 }
 
@@ -184,8 +185,8 @@ impl Default for AgreementConfig {
 
 /// When and from where a poor pose is refined again; see [`crate::Comparison::refine_pose`].
 ///
-/// All of them were fitted on the simulator's pictures: with them 0 instead of 25 of 960 poses ended beside the part,
-/// and 7 instead of 60 had an error above 3 px.
+/// All three values were fitted on the simulator's pictures: with further refinement 0 instead of 25 of 960 poses ended
+/// beside the part, and 7 instead of 60 had an error above 3 px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct RefinementConfig {
@@ -193,7 +194,7 @@ pub struct RefinementConfig {
     pub sure_agreement: f64,
     /// Distance in pixels between a pose whose agreement stays poor and the starts of further climbs.
     pub restart_px: f64,
-    /// Minimum agreement for further climbs: no pose below it was the part.
+    /// Minimum agreement for further climbs: no pose of lower agreement was the part.
     pub min_restart_agreement: f64,
 }
 

@@ -21,7 +21,7 @@ const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
 const NUM_DIRECTIONS: usize = 6;
 /// Rounds of gathering crests anew. Chosen by hand to save time.
 const ROUNDS: usize = 3;
-/// ln of the shortening at the maximum tilt of a part on a table: 50°. Derived.
+/// ln of the shortening at the maximum tilt of the camera, 50°. Derived.
 const MAX_LOG_RATIO: f64 = 0.45;
 
 /// Largest edge movement by a shortening, as shift in x and in y (px), rotation (rad) and ln scale. Chosen by hand,
@@ -37,7 +37,7 @@ pub struct Foreshortening {
     pub direction: Angle,
     /// The share of edge points on a crest of the image, in `[0, 1]`.
     pub consensus: f64,
-    /// The same at the pose without shortening.
+    /// The share of edge points on a crest at the pose without shortening, in `[0, 1]`.
     pub level_consensus: f64,
 }
 

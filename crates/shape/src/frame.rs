@@ -54,7 +54,7 @@ impl Frame {
         self.sampled_by(image, image_from_cutout, (self.step * image_from_cutout.scale).ceil())
     }
 
-    /// The same with fewer samples, so that some pixels may be skipped.
+    /// Mean colours as [`Self::sampled`] returns them, but from fewer samples, so that some pixels may be skipped.
     pub(crate) fn sampled_sparsely(
         &self,
         image: &RgbImage,

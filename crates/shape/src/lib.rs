@@ -12,10 +12,10 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area in both directions;
-//! a [`Comparison`] scores edges and surface together and collects the [`Evidence`] for a pose. [`ShapeSearch`] needs
-//! no detector: it coarsely tries every position, angle and scale in a whole image and refines the best.
-//! [`ShapeConfig`] holds the fitted values, with their origin.
+//! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area, also edges in only
+//! one of the two pictures; a [`Comparison`] scores edges and surface together and collects the [`Evidence`] for a
+//! pose. [`ShapeSearch`] needs no detector: it coarsely tries every position, angle and scale in a whole image and
+//! refines the best. [`ShapeConfig`] holds the fitted values, with their origin.
 //!
 //! # Legend
 //!

@@ -42,8 +42,8 @@ impl<'a> PixelReader<'a> {
         inside
     }
 
-    /// The same, but a place beyond the border gets the colour of the nearest pixel. A coordinate that is not a number
-    /// counts as 0.
+    /// The colours as [`Self::colors`] returns them, but a place beyond the border gets the colour of the nearest
+    /// pixel. A coordinate that is not a number counts as 0.
     #[inline(always)]
     pub(crate) fn colors_to_border<const N: usize>(&self, x: &[f32; N], y: &[f32; N], out: &mut [f32x4; N]) {
         let (mut along, mut below, mut idxs) = ([0.0; N], [0.0; N], [0u32; N]);

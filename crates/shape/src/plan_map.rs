@@ -37,7 +37,7 @@ pub struct PlanMap {
     columns: usize,
     /// Row by row, [`CELL`] pixels apart.
     nodes: Vec<Option<Point2<f64>>>,
-    /// Samples per side for a pixel, so that no pixel of the picture is skipped.
+    /// Samples per side for a pixel, so that no pixel of the picture is skipped; at most [`MAX_SAMPLES`].
     samples: usize,
 }
 

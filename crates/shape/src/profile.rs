@@ -1,7 +1,7 @@
 //! The position of a part of revolution along its axis, and which end is which.
 //!
-//! In another roll the threads are shifted along the part and its light has changed, so that edges inside its outline
-//! shift a pose along the axis or turn it end for end. The profile is the same in every roll.
+//! In a roll other than the photo's the threads are shifted along the part and its light has changed, so that edges
+//! inside its outline shift a pose along the axis or turn it end for end. The profile is the same in every roll.
 
 use std::ops::RangeInclusive;
 
@@ -17,7 +17,7 @@ use crate::template::ShapeTemplate;
 
 /// Number of shifts along the axis in each direction at which the profile is compared with the picture.
 const NUM_SHIFTS: i32 = 4;
-/// Step of these shifts, in part lengths; the largest shift exceeds a thread's pitch.
+/// Step of the shifts along the axis, in part lengths; the largest shift exceeds a thread's pitch.
 const SHIFT: f64 = 0.03;
 /// Largest movement of a pose from its shifted start.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };

@@ -24,11 +24,11 @@ use crate::template::{LevelSampling, MatchedLevel, ShapeTemplate, TemplateLevel}
 
 /// Number of poses followed from the coarsest level; time is proportional to it. Chosen by hand, not measured.
 const NUM_CANDIDATES: usize = 5;
-/// Step of the grid of poses, in level pixels of edge movement: directions are constant within two
-/// pixels of an edge. Derived from that, not measured.
+/// Step of the grid of poses, in level pixels of edge movement: directions are constant within two pixels of an edge.
+/// Derived from this distance, not measured.
 const GRID_STEP: f64 = 1.5;
-/// Penalty of agreement for a pose at all limits of the capture range, so that the prediction wins ties. Chosen by
-/// hand, not measured.
+/// Penalty of agreement for a pose with all coordinates at the limits of the capture range, so that the prediction wins
+/// ties. Chosen by hand, not measured.
 const DISTANCE_PENALTY: f64 = 0.03;
 /// The climb: steps in level pixels of edge movement, and the maximum number of steps. Chosen by hand, not measured.
 const CLIMB: CompassSearch =

@@ -8,9 +8,9 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Mask, Polygon};
 
 /// Minimum share of the part covered by its mirror image. Seven rendered parts of revolution and a photographed screw
-/// have at least 0.92 (a deep thread with one start, whose sides differ).
+/// have at least 0.92; the lowest has a deep thread with one start, whose sides differ.
 const MIN_SYMMETRY: f64 = 0.85;
-/// Minimum length over mean width; those parts have at least 3.4.
+/// Minimum length over mean width; the parts measured for [`MIN_SYMMETRY`] have at least 3.4.
 const MIN_SLENDERNESS: f64 = 2.5;
 /// Minimum share of the light's variance that is explained by the position across the axis. Those parts have at least
 /// 0.39; flat parts that are as symmetric and as slender have at most 0.19.

@@ -12,7 +12,7 @@ use crate::lanes::{LANES, in_lanes};
 
 /// Search distance of an edge point along its normal in the first round, in level pixels. Chosen by hand, not measured.
 pub(crate) const FIRST_REACH: usize = 6;
-/// The same in later rounds.
+/// Search distance in later rounds.
 pub(crate) const LATER_REACH: usize = 3;
 /// Maximum number of crests per point. Chosen by hand, not measured.
 pub(crate) const MAX_CRESTS: usize = 3;

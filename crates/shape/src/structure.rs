@@ -17,7 +17,7 @@ use sdg_geometry::{PlanarSimilarity, Polygon};
 use crate::config::{AgreementConfig, StructureConfig};
 use crate::gradient_field::GradientField;
 
-/// How well the edges of an image agree with the demonstration's, in both directions.
+/// How well the edges of an image agree with the demonstration's, both ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureAgreement {
     /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: these
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn what_covers_a_part_of_it_is_not_visible() {
-        // A bright sheet with a dark line across it lies over the right half.
+        // A bright sheet with dark stripes lies over the right half.
         let covered = RgbImage::from_fn(200, 140, |x, y| match (x, y) {
             (90.., _) if (x + 2 * y) % 40 < 20 => Rgb([230; 3]),
             (90.., _) => Rgb([30; 3]),

@@ -1,8 +1,8 @@
 //! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! A lever with nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured; the part
-//! itself in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness
-//! and colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
+//! A lever with nearly the outline of the taught part agrees in its edges (0.71 to 0.75 was measured; the part itself
+//! in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness and
+//! colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
@@ -10,10 +10,9 @@
 //!                              cell's own mean, averaged               2/3 ─┘
 //! ```
 //! The correlation over the whole part compares its bright and dark ends, but a shadow edge of another object that
-//! falls across the part makes it low. Within most cells that shadow has no edge. On 480 pictures of the eight shipped
-//! parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right poses below the best wrong
-//! one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the best wrong one of
-//! their own part.
+//! falls across the part makes it low. Within most cells that shadow has no edge. On 480 pictures of the paper's eight
+//! parts and 480 without them, with edges and the whole correlation (6 : 4), 48 of 950 right poses scored below a wrong
+//! pose of any part and 13 below one of their own part; with edges, cells and the whole (7 : 2 : 1), 30 and 4.
 
 use std::collections::BTreeMap;
 
@@ -27,13 +26,13 @@ use crate::config::SurfaceConfig;
 use crate::lanes::{LANES, in_lanes};
 use crate::pixel_cell::PixelReader;
 
-/// Number of compared points; a few hundred are enough for correlations and take microseconds. Derived from that; it
-/// was 700 before cells were introduced.
+/// Number of compared points; a few hundred are enough for correlations and take microseconds. Derived from that; the
+/// value was 700 before cells were introduced.
 const POINTS: f64 = 900.0;
 /// Minimum number of points of a compared cell. Chosen by hand, not measured.
 const MIN_IN_CELL: usize = 4;
-/// Points within this distance of the outline show the background when the pose is wrong by a pixel. Derived from
-/// that, not measured.
+/// Points within this distance of the outline show the background when the pose is wrong by a pixel. Derived from this
+/// error, not measured.
 const EDGE_MARGIN_PX: f64 = 2.0;
 /// Minimum grey value of a colour with a hue. Chosen by hand, not measured.
 const DARK: f64 = 3.0;
@@ -155,7 +154,7 @@ impl Surface {
         self.points().filter(|point| is_inside(point)).count() as f64 / self.points().count() as f64
     }
 
-    /// The same share, estimated from a sixteenth of the points.
+    /// The share of the points in `outline`, estimated from a sixteenth of the points.
     pub(crate) fn share_inside_roughly(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
         let is_inside = inside(outline, outline_from_cutout);
         let points = || self.points().step_by(16);
@@ -174,7 +173,7 @@ impl Surface {
 
     /// Distance of the hue from the demonstration's: the median over cells of the distance between the shares of red,
     /// green and blue; 0 where none of it is in the image. Desaturation by highlights and saturation by shadows do not
-    /// count, nor does anything that covers less than half; the light's tint counts.
+    /// count, nor does anything that covers less than half of the part; the light's tint counts.
     pub(crate) fn hue_shift(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let mut shifts = Vec::with_capacity(self.cells.len());
         for sums in self.correlations(image, image_from_cutout) {

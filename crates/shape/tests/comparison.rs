@@ -142,7 +142,7 @@ fn table_where_the_part_should_be_is_bare_and_has_no_rim() {
     // A plate of half the length: the other half of the outline lies on the table.
     let look = plate_look(&plate(0.0, 75.0, 110.0, 75.0), &PlanarSimilarity::IDENTITY);
     assert!((0.3..0.6).contains(&look.bare) && look.no_rim > 0.3, "{look:?}");
-    // An object that covers a part of it is not table.
+    // An object that covers some of the plate is not table.
     let mut covered = plate(0.0, 75.0, 180.0, 140.0);
     for (x, y) in (150..205).flat_map(|x| (100..156).map(move |y| (x, y))) {
         covered.put_pixel(x, y, Rgb([224, 172, 140]));

@@ -1,7 +1,7 @@
 //! Pairs of similar features, found by comparing all with all.
 //!
-//! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. The crate's README compares both;
-//! `examples/matching_bench.rs` measures the figures.
+//! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. The crate's README compares it with
+//! this search; `examples/matching_bench.rs` measures the figures.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;

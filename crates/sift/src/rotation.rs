@@ -90,7 +90,8 @@ pub enum RotationMethod {
 }
 
 impl RotationEstimate {
-    /// Whether another rotation explains the outlines equally well within 0.03; never true for matched keypoints.
+    /// Whether another rotation has an overlap of the outlines lower by less than 0.03; never true for matched
+    /// keypoints.
     pub fn is_ambiguous(&self) -> bool {
         match self.method {
             RotationMethod::Features { .. } => false,
@@ -184,7 +185,7 @@ impl RotationEstimator {
         let guided = matches_at_pose(template, image, &fit.image_from_template, &self.config.ransac);
         let from: Vec<Point2<f64>> = guided.iter().map(|&(i, _)| template.keypoints[i].position).collect();
         let to: Vec<Point2<f64>> = guided.iter().map(|&(_, j)| image.keypoints[j].position).collect();
-        // The new pose is used only if it has at least as many matches as before.
+        // The new pose is used only if it comes from at least as many matches as the fit has inliers.
         let refined = PlanarSimilarity::fit(&from, &to).filter(|_| guided.len() >= fit.inliers.len());
         let (pose, residual_px) = match refined {
             Some(pose) => {

@@ -118,8 +118,8 @@ impl Silhouette {
     /// Aligns this outline, the template's, with the image's outline.
     ///
     /// # Source
-    /// Chen and Medioni 1991 (iterated closest points, distances along the normal), in both directions and trimmed
-    /// (Chetverikov et al. 2002).
+    /// Chen and Medioni 1991 (iterated closest points, distances along the normal), from each outline to the other and
+    /// trimmed (Chetverikov et al. 2002).
     pub(crate) fn lay_on(&self, image: &Self) -> Option<SilhouetteFit> {
         let scale = (image.area / self.area).sqrt();
         let fits: Vec<(PlanarSimilarity, f64)> = starts(&self.profile, &image.profile)

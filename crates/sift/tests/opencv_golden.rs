@@ -1,5 +1,4 @@
-//! Compares with OpenCV 5.0.0: the keypoints are the same, and the descriptors nearly the same
-//! (`compare/write_golden.py`).
+//! Compares keypoints and descriptors with those of OpenCV 5.0.0 (`compare/write_golden.py`).
 
 use crate::support;
 use sdg_sift::{DescriptorNormalization, Plane, Sift, SiftConfig};

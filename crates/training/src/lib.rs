@@ -6,10 +6,10 @@
 //! held-out samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! One loop (run.rs) trains both; their differences are in a `Task`: batches, loss, validation.
+//! One loop (run.rs) trains both networks; their differences are in a `Task`: batches, loss, validation.
 //!
-//! A run is a function of its seed: the samples, their order, and every random choice of the losses. It depends
-//! on the machine only if a time budget shortens it.
+//! A run is a function of its seed: the samples, their order, and every random choice of the losses. Apart from
+//! rounding by other vector instructions, it depends on the machine only if a time budget shortens it.
 //!
 //! This crate deliberately does not read grasps from detections (the `grasp` crate passes a function for this), has no
 //! files, and prints nothing: a run reports its progress by [`TrainingEvent`]s or [`orientation::OrientationEvent`]s.

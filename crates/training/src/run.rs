@@ -1,4 +1,4 @@
-//! The loop that trains every network: batch, loss, gradients, step, and sometimes a validation.
+//! The loop that trains the detector and the orientation CNN: batch, loss, gradients, step, and sometimes a validation.
 //!
 //! A [`Task`] defines the training; the loop handles only the order, the learning rate and the end of a run.
 

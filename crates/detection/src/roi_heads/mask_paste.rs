@@ -68,8 +68,8 @@ impl BoxMask {
     /// The mask by [`MaskPasting::WholePixels`].
     ///
     /// # Source
-    /// torchvision's `paste_masks_in_image`: the padded mask over the box, which is enlarged by the same factor
-    /// and truncated to whole pixels, including the last ones; above the threshold, as in its examples.
+    /// torchvision's `paste_masks_in_image`: the mask is padded, and its box enlarged by the same factor and truncated
+    /// to whole pixels, including the last ones; above the threshold, as in torchvision's examples.
     fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let padded = self.padded();
         let enlarged = padded.size as f32 / self.size as f32;

@@ -13,7 +13,7 @@ pub fn absent(condition: Condition) -> SceneConfig {
     SceneConfig { absent_share: 1.0, ..SceneConfig::only(condition) }
 }
 
-/// `count` parts that can be taught, each with this many pictures of each kind.
+/// `count` parts that can be taught, each with as many pictures of each kind as `kinds` gives.
 pub fn draw_parts(
     count: usize,
     [width, height]: [u32; 2],

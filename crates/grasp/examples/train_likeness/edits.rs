@@ -15,7 +15,7 @@ const MOVED_PX: [f32; 2] = [4.0, 10.0];
 const STRETCH: [f32; 2] = [0.1, 0.3];
 /// Minimum total change of the photo by an edit, in pixels of full contrast.
 const MIN_CHANGE: f32 = 2.5;
-/// Number of edits that are tried.
+/// Maximum number of edits that are tried.
 const TRIES: usize = 12;
 
 /// Replaces the photo by that of another part; `None` if no edit changed the photo enough.

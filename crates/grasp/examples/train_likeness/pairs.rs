@@ -44,7 +44,7 @@ impl Pairs {
     /// No examples.
     pub const EMPTY: Self = Self { bytes: Vec::new() };
 
-    /// Generates the missing parts and searches for them; held-out parts use another seed.
+    /// Generates the missing parts and searches for them; held-out parts use another seed than training parts.
     pub fn drawn_up_to(self, parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
         let once = |condition| (SceneConfig::only(condition), 1);
         let kinds: Vec<(SceneConfig, u64)> = Condition::ALL
@@ -199,7 +199,7 @@ fn in_other_light(colors: &[Option<[f32; 3]>], strength: f32, rng: &mut Pcg64Mcg
                 color.map(|value| {
                     let lit = (value.max(1e-3).powf(gamma) * gain * tint[channel]).min(1.0);
                     channel += 1;
-                    // Three uniform numbers are nearly normal, with a standard deviation of 1.
+                    // The sum of three uniform numbers is nearly normal, with a standard deviation of 1.
                     let normal: f32 = (0..3).map(|_| rng.random_range(-1.0f32..1.0)).sum();
                     lit + noise * normal
                 })

@@ -6,9 +6,9 @@
 //!                                                       best value of each ─── loss on the held-out half ───┘
 //! ```
 //! First the weights of the score are fitted, without searching the pictures again. Then each constant of
-//! [`CheckConfig::search`] is fitted alone, with the others at their present values. For each tried value, including
-//! the present one, every picture is searched again and the weights are fitted again, because the evidence depends on
-//! the constants.
+//! [`CheckConfig::search`] is fitted alone, with the others at their present values. For each value the weights are
+//! fitted again, and for each value but the present one the pictures are searched again, because the evidence depends
+//! on the constants.
 //!
 //! **Loss** ([`Loss`]). A picture's detections are scored as in detection. Let p be the best score of a correct pose of
 //! an instance and q the best score of a wrong pose in a picture, each 0 if there is none; both are clamped to 0.01 and
@@ -68,7 +68,7 @@ pub fn constant_names() -> Vec<&'static str> {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FitEvent<'a> {
-    /// All pictures are searched with a value of a constant.
+    /// The pictures of the training half are searched with a value of a constant.
     Searching {
         /// Name of the constant.
         constant: &'static str,
@@ -161,7 +161,7 @@ impl Sides<'_> {
     }
 }
 
-/// For each value, searches every picture again and refits the score's weights.
+/// Refits the score's weights for each value, and searches the pictures again for each but the present one.
 fn fit_constant(
     constant: &Constant,
     sides: &Sides<'_>,

@@ -26,7 +26,8 @@ type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 const NUM_ROUNDS: usize = 16;
 /// Newton steps of one regression.
 const NUM_STEPS: usize = 12;
-/// Keeps weights finite if a term carries no information, in units of a term's standard deviation. Chosen by hand.
+/// Ridge penalty, for terms of standard deviation 1: keeps the weight of a term without information finite. Chosen by
+/// hand.
 const RIDGE: f64 = 2e-4;
 /// Minimum fraction of instances with a correct pose among the found ones. Parts with less, which are nearly symmetric,
 /// carry no information about the score.
@@ -244,9 +245,9 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The same score with other neutral values: half-way between the medians of correct and wrong poses, so that a
+/// The score of `config` with other neutral values: half-way between the medians of correct and wrong poses, so that a
 /// positive contribution supports the part; for resemblance the median of all; for size and outside 0, their best
-/// value.
+/// value; for the terms from details on, an end of the range.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {
@@ -259,7 +260,8 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
         term.neutral = match k {
             0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
             6 => median(k, None),
-            // `details` counts against a part only, below the end of its range; the others from the start of theirs.
+            // `details` only counts against a part, below the end of its range; the terms after it count from the start
+            // of their range.
             8 => term.range[1],
             9.. => term.range[0],
             _ => 0.0,

@@ -39,7 +39,7 @@ pub(crate) struct PoseCandidate {
     pub(crate) grasp: PlanarGrasp,
     /// The demonstration that is compared first.
     pub(crate) demonstration_idx: usize,
-    /// The pose of that demonstration.
+    /// The pose of the demonstration's cut-out in the image.
     pub(crate) image_from_cutout: PlanarSimilarity,
     pub(crate) turn_source: TurnSource,
 }

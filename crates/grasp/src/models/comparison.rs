@@ -25,7 +25,7 @@ const MAX_COMPARED: usize = 5;
 /// resolution: the most likely ones. A maximum of four found no further part.
 const MAX_CORRECTED: usize = 2;
 /// Maximum number of candidates of an image that are also compared rotated by 180° at high resolution: the most likely
-/// ones. Such a view takes four times as long as another.
+/// ones. Such a view takes four times as long as one at the first resolution.
 const MAX_TURNED: usize = 2;
 
 /// Evaluates the network on one picture.

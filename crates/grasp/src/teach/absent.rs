@@ -25,8 +25,8 @@ use crate::taught::TaughtDemonstration;
 const SAMPLE_INTERVAL: u64 = 12;
 /// Number of held-out samples with the part for calibrating the score. Chosen to save time: one takes about 50 ms.
 const NUM_POSITIVES: u64 = 12;
-/// First index of these samples: far beyond the samples for the networks' validation, and separate from those for the
-/// reported quality.
+/// First index of the held-out samples with the part: far beyond the samples for the networks' validation, and separate
+/// from those for the reported quality.
 const FIRST_POSITIVE: u64 = 1 << 36;
 /// Margin below a score of 0.5 for detections without the part, in log-odds. Chosen by hand.
 const MARGIN: f64 = 0.2;

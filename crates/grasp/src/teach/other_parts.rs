@@ -32,7 +32,7 @@ pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
 }
 
 /// Number of pictures of other parts on which the network's score is calibrated, so that there are about as many
-/// pictures without the part as with it. Derived from that, not measured.
+/// pictures without the part as with it. Derived from this reason, not measured.
 const NUM_PICTURES: u64 = 16;
 
 /// The scores of a network in pictures of other parts without the part.

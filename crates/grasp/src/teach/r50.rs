@@ -9,7 +9,7 @@ use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
 pub(super) const SHORT_SIDE_PX: u32 = 480;
 
 /// An R50 with the numerics of its weights, except for two changes that save minutes on such a computer. Images are not
-/// enlarged to 800 pixels, which adds no detail to a photo of 480. COCO images show dozens of objects, but
+/// enlarged to 800 pixels, which adds no detail to a photo 480 pixels high. COCO images show dozens of objects, but
 /// demonstrations show one, so that fewer regions go through the heads; the keypoint head takes 7 GFLOP for each. The
 /// numbers were chosen by hand to save time; their effect on accuracy was not measured.
 pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {

@@ -1,9 +1,9 @@
 //! Parts that look the same at several rotations.
 //!
 //! A sample's record contains the part's rotation, which the picture of a symmetric part does not show. A network
-//! trained on it would learn the mean of the rotations, and a validation would count correct answers as wrong.
-//! Therefore keypoints are taught at their positions for the smallest equivalent rotation, and invisible rotations are
-//! not errors.
+//! trained on this rotation would learn the mean of the rotations, and a validation would count correct answers as
+//! wrong. Therefore keypoints are taught at their positions for the smallest equivalent rotation, and invisible
+//! rotations are not errors.
 
 use nalgebra::Point2;
 use sdg_demonstration::{Demonstration, Sample};
@@ -35,7 +35,7 @@ impl HiddenTurns {
             for keypoint in &mut object.keypoints {
                 let at = back.apply(&keypoint.point());
                 let inside = (0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y);
-                // An object that covers the part was not rotated with it, so that it is unknown whether it covers this
+                // An object in front of the part was not rotated with it; it is unknown whether the object covers this
                 // place.
                 *keypoint = match inside {
                     true => Keypoint::visible(at),

@@ -154,8 +154,7 @@ fn one_network_serves_the_models_that_are_taught_alike() {
     let taught = taught(Preset::Edge, ModelKind::C);
     let read = taught.clone().read_as(ModelKind::B).unwrap();
     assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
-    // The boxes are the same, in the order of the other model's scores; positions differ, and the conversion back
-    // restores them.
+    // Both models give the same boxes, each in the order of its own scores. Conversion back restores the detections.
     let photo = demonstration().image;
     let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
     let boxes = |model: &GraspModel| {

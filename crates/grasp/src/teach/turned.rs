@@ -1,6 +1,6 @@
 //! Finds photos whose grasp points in another direction than that of the first photo.
 //!
-//! A model taught from both would grasp the part in two ways, with the hand turned.
+//! A model taught from two such photos would grasp the part in two ways, with the hand turned.
 
 use sdg_demonstration::Demonstration;
 

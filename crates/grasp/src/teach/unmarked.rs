@@ -1,7 +1,7 @@
 //! Removes parts that are not marked from the photos of a demonstration.
 //!
-//! The photos are the background of the samples: a part in it would be taught as background, raise the resemblance of
-//! other objects, and count as a wrong detection.
+//! The photos are the background of the samples: an unmarked part there would be taught as background, raise the
+//! resemblance of other objects, and count as a wrong detection.
 
 use sdg_demonstration::Demonstration;
 use sdg_geometry::Polygon;

@@ -18,9 +18,9 @@ use crate::same_part::are_outlines_of_same_part;
 /// A pose at this distance from its track's pose is carried forward like the pose of another part, because a capture
 /// from the track's pose does not reach it. In pixels of the cut-out. Chosen by hand.
 const FAR_PX: f64 = 8.0;
-/// This distance in radians. Chosen by hand.
+/// Rotation from its track's pose from which a pose counts as distant, in radians. Chosen by hand.
 const FAR_RAD: f64 = 0.15;
-/// Minimum gain of agreement of such a distant pose. Chosen by hand.
+/// Minimum gain of agreement of a pose farther than [`FAR_PX`] or rotated by more than [`FAR_RAD`]. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;
 
 /// Whether a track is near enough to the newest frame to be followed into it.
@@ -65,7 +65,7 @@ pub(super) enum Match {
     Disagrees,
 }
 
-/// Compares a detection with the track's pose in that frame.
+/// Compares a detection with the track's pose in the detection's frame.
 pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placement, past: &PastPose) -> Match {
     let demonstration = &detector.model().demonstrations()[placement.demonstration_idx];
     let there = demonstration.outline(&past.image_from_cutout);

@@ -46,7 +46,7 @@ pub(super) struct SizedPart {
 pub(super) enum Effort {
     /// Some pixels, for following from frame to frame.
     Snapped,
-    /// Twice as many pixels, five times slower.
+    /// A wider range, about five times slower.
     Captured,
 }
 
@@ -212,7 +212,7 @@ impl SizedPart {
             let grid = step * shrink;
             let least = MIN_LEVEL_SIDE * grid;
             let from = ((low - margin).max(0.0) as u32).min(limit) / grid * grid;
-            // Near the frame's border the window is extended to the other side.
+            // Near the frame's border the window is extended away from it.
             let from = from.min(limit.saturating_sub(least) / grid * grid);
             let to = ((high + margin).max(0.0).ceil() as u32).max(from + least).min(limit);
             (to >= from + shrink).then_some((from, to - from))

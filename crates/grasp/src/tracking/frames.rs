@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use image::RgbImage;
 
-/// Maximum time between frames through which a detection is carried: a part at 0.5 m/s moves by 20 pixels of a
-/// millimetre, which is within a capture's range. Derived from that.
+/// Maximum time between frames through which a detection is carried: a part at 0.5 m/s moves by 20 mm, 20 pixels at 1
+/// px per mm, which is within a capture's range. Derived from this range.
 const MAX_STRIDE: Duration = Duration::from_millis(40);
 /// Maximum number of frames kept for a running search; beyond it, only every second frame is kept. Chosen by hand: 44
 /// MB with 640×480 pixels.

@@ -12,9 +12,10 @@
 //! wider reach, about five times slower. *Held*: kept at the pose of the last search, because the part has not moved
 //! since. *Carried forward*: a detection in an older frame is followed through the later frames up to the newest.
 //!
-//! A track is scored in every frame like a detection ([`crate::Contributions`]), with one difference: the close look,
-//! which takes the most time, is made only in searches and if the agreement of edges and surface has changed since the
-//! last one, or after a second. A track whose score falls below [`TrackerConfig::lose_below`] is lost in that frame.
+//! A followed track is scored in every frame like a detection ([`crate::Contributions`]), with two differences. A held
+//! track keeps the score of its last search. The close look, which takes the most time, is made only in searches and if
+//! the agreement of edges and surface has changed since the last one, or after a second. A track whose score falls
+//! below [`TrackerConfig::lose_below`] is lost in that frame.
 //!
 //! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
 //! decides where and when searches run, so that the same code runs on two cores, in a browser, and, with the same

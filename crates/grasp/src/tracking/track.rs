@@ -33,7 +33,7 @@ const POOR_SHARE: f64 = 0.85;
 /// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences indicate
 /// another place. In pixels of the cut-out; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
-/// This difference in radians. Chosen by hand.
+/// Maximum difference in rotation that is a correction, in radians. Chosen by hand.
 const MAX_CORRECTION_RAD: f64 = 0.06;
 /// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;
@@ -182,8 +182,8 @@ impl Track {
         }
     }
 
-    /// Compares a search's pose with the pose by edges in that frame: a small difference corrects the following frames,
-    /// a large one is tried in the next frame.
+    /// Compares a search's pose with the pose by edges in the searched frame: a small difference corrects the following
+    /// frames, a large one is tried in the next frame.
     pub(super) fn correct(&mut self, detector: &PartDetector, past: &PastPose, found: &Placement) {
         let difference = past.by_edges.inverse().compose(&found.image_from_cutout);
         let middle = self.part.demonstration(detector).marks.bbox.center();
@@ -348,7 +348,7 @@ impl Track {
         self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
     }
 
-    /// The track's pose in a frame, if it was followed in it.
+    /// The track's pose in a frame, if it was followed there.
     pub(super) fn past_pose(&self, number: u64) -> Option<PastPose> {
         let idx = self.history.binary_search_by_key(&number, |past| past.number).ok()?;
         self.history.get(idx).copied()

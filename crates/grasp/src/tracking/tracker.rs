@@ -76,7 +76,7 @@ pub struct Tracker {
 /// The kind of discontinuity between a frame and the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Gap {
-    /// The frame is the first, or was taken long after the last.
+    /// The frame is the first, or was taken long after the one before.
     Unrelated,
     /// Other objects are visible, and the parts may have moved.
     Changed,
@@ -145,8 +145,8 @@ impl Tracker {
     }
 
     /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
-    /// it is the first or was taken long after the last, or a followed part is not at its place or the picture changed
-    /// elsewhere, and this does not count as a movement ([`TrackerConfig::moves_within`]). Its result goes to
+    /// it is the first or was taken long after the one before, or a followed part is gone or the picture changed
+    /// elsewhere, without counting as a movement ([`TrackerConfig::moves_within`]). Its result goes to
     /// [`Self::answer`]. A running search is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;

@@ -65,7 +65,7 @@ fn conv2d_agrees_with_burn_and_its_gradients() {
 #[test]
 fn conv_transpose2d_agrees_with_burn_and_its_gradients() {
     let cases = [
-        // The kernels of the keypoint head and the mask head.
+        // The kernels of the keypoint head and the mask head, and one at stride 1.
         ([2, 6, 7, 7], [6, 5, 4, 4], [2, 2], [1, 1]),
         ([3, 4, 5, 6], [4, 7, 2, 2], [2, 2], [0, 0]),
         ([1, 3, 4, 5], [3, 2, 3, 3], [1, 1], [1, 1]),

@@ -4,7 +4,8 @@
 //!
 //! Maps are channels last, so the values that a kernel row ky needs at a position are one run of Kw·C floats, and the
 //! next position's run starts stride·C later. The product has output channels as rows, (kx, c) as columns, and
-//! positions as depth. It reads everything in place; only a padded x is first copied with zeros around it.
+//! positions as depth. It reads everything in place, except an x with padding, or with Kw·C not a multiple of sixteen,
+//! which is first copied with zeros around it.
 //!
 //! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 
@@ -140,7 +141,7 @@ impl<'a> PaddedInput<'a> {
         let [in_height, in_width] = shape.in_size;
         let [out_height, out_width] = shape.out_size;
         let channels = shape.in_channels;
-        // Kernel rows that end within a vector read further; at the last pixel that would be outside the maps.
+        // Kernel rows that end within a vector read further; at the last pixel they would leave the maps.
         let whole = (shape.kernel[1] * channels).is_multiple_of(LANES);
         if shape.params.padding == [0, 0] && whole {
             let values = PaddedValues::InPlace(x.values);

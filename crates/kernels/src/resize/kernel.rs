@@ -1,4 +1,4 @@
-//! Max pooling and doubling on channels-last `f32` slices, `[N, H, W, C]`.
+//! Max pooling and doubling of a map's height and width, on channels-last `f32` slices, `[N, H, W, C]`.
 
 use super::MaxPool2dParams;
 use crate::parallel::{SharedSlice, for_each_unit};

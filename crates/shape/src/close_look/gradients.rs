@@ -23,7 +23,7 @@ const MAX_SHIFT_SQUARED: isize = 5;
 const REACH: usize = 2;
 /// Minimum of the noise level, in grey levels per pixel: gradients below the noise level have little weight.
 const NOISE: f32 = 1.5;
-/// The noise level as a share of the gradients' root mean square, if that is more.
+/// The noise level as a share of the gradients' root mean square, if that is more than [`NOISE`].
 const NOISE_SHARE: f32 = 0.4;
 /// Mean squared length of `v` that is added to every window, so that two empty windows do not correlate.
 const EMPTY: f32 = 0.01;
@@ -38,7 +38,7 @@ pub(super) struct Gradients {
     signed: [Vec<f32>; 2],
     /// x and y of `v` at twice its angle.
     doubled: [Vec<f32>; 2],
-    /// Squared lengths, equal for both.
+    /// Squared lengths of `v`; doubling the angle does not change them.
     energy: Vec<f32>,
 }
 

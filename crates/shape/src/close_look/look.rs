@@ -22,7 +22,8 @@ pub struct CloseLook {
 }
 
 impl CloseLook {
-    /// Whether the pose is good enough for a comparison with rivals; others are refused. Chosen by hand to save time.
+    /// Whether the pose is good enough for a comparison with rivals; worse poses are refused anyway. Chosen by hand to
+    /// save time.
     pub(crate) fn is_plausible(&self) -> bool {
         self.fit >= 0.45 && self.bare < 0.25 && self.no_rim < 0.35
     }

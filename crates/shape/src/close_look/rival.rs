@@ -23,7 +23,7 @@ use crate::template::ShapeTemplate;
 
 /// Number of angles at which the rival is laid over the photo.
 const NUM_TURNS: usize = 36;
-/// Number of the best of these poses that are followed to the agreement's level.
+/// Number of the best poses of the rival that are followed to the agreement's level.
 const NUM_FOLLOWED: usize = 14;
 /// Number of the best followed poses that are tried in pictures.
 const NUM_STARTS: usize = 4;
@@ -37,14 +37,14 @@ const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
 const MIN_RESEMBLANCE: f64 = 0.4;
 /// A rotation is compared closely if its agreement with the picture is lower than the original pose's by at most this.
 const MAX_LOSS_BY_TURN: f64 = 0.03;
-/// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
+/// Minimum extent of the differences between mirror image and photo, as a share of the photo's edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
-/// Minimum extent of the differences from the original pose, as a share of the edges, of a rotation that replaces it.
-/// Chosen by hand.
+/// Minimum extent of the differences between the photo at the original pose and at a rotation that replaces it. Chosen
+/// by hand.
 const MIN_SHARE_OF_TURN: f64 = 0.02;
 /// Minimum gain of correlation by a rotation that replaces the pose. Chosen by hand.
 const MIN_GAIN_BY_TURN: f64 = 0.1;
-/// A window differs if the edges of the two pictures in it correlate by less than this.
+/// A window differs if the edges of photo and rival in it correlate by less than this.
 const SAME: f32 = 0.6;
 
 /// The poses, from the template's own pixels to the cut-out's, at which `template` resembles the photo most. They are

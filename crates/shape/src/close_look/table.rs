@@ -29,7 +29,7 @@ impl TableColors {
         Self::of(&shrunk(image))
     }
 
-    /// The same from colours as [`lab`] returns them.
+    /// Reads colours as [`lab`] returns them.
     pub(super) fn of(pixels: &[[f32; 3]]) -> Self {
         if pixels.is_empty() {
             return Self { colors: Vec::new() };

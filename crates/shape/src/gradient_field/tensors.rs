@@ -92,7 +92,7 @@ pub(super) fn structure_tensors(planes: &Planes) -> Vec<[f32; 4]> {
     samples
 }
 
-/// The same for the rows from `start` to before `end`, through rings of three rows that stay in the cache.
+/// The tensors of the rows from `start` to before `end`, computed through rings of three rows that stay in the cache.
 fn tensors_of_band(planes: &Planes, start: usize, end: usize) -> Vec<[f32; 4]> {
     let mut samples = vec![[0.0; 4]; planes.width * (end - start)];
     fill_band(planes, start, end, &mut samples);

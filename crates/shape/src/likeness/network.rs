@@ -21,7 +21,7 @@ pub const LAYERS: [Layer; 6] = [
 ];
 /// Mean and maximum of the last convolution's channels.
 const NUM_POOLED: usize = 2 * LAYERS[LAYERS.len() - 1].outputs;
-/// Hidden units between those and the output.
+/// Hidden units between the pooled values and the output.
 pub const NUM_HIDDEN: usize = 64;
 
 /// Weights of the network.

@@ -6,7 +6,7 @@ use crate::edge_points::EdgePoint;
 use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
 
 /// Largest movement of the outer points from one pose to the next, in level pixels: the image's directions are spread
-/// by half of it to each side. Derived from the spread.
+/// by half of this movement to each side. Derived from the spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
 
 /// One angle and scale.
@@ -92,7 +92,7 @@ impl Variant {
                 }
             })
             .collect();
-        // Neighbouring reads use the same memory.
+        // Sorted, so that consecutive reads are near each other in memory.
         looks.sort_unstable();
         Self { angle_rad, log_scale, looks }
     }

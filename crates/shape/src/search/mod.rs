@@ -50,8 +50,8 @@ use crate::template::ShapeTemplate;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SearchConfig {
-    /// Range of scales; 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
-    /// known, is faster and causes fewer errors. The default was chosen by hand.
+    /// Range of scales; 1 is the demonstration's own size. A narrow range around 1, where the camera's height is known,
+    /// is faster and causes fewer errors than a wide one. The default was chosen by hand.
     pub scales: RangeInclusive<f64>,
     /// Minimum agreement of a reported match, in `[0, 1]`. The default was chosen by hand.
     pub min_agreement: f64,
@@ -62,8 +62,8 @@ pub struct SearchConfig {
     /// above that, points repeat.
     pub num_points: usize,
     /// Maximum number of starts of the sweep that are climbed at the template's coarsest level, 8 to 4096, the best of
-    /// every scale first. The first 64 are always climbed; more only if parts are found and further starts resemble
-    /// theirs.
+    /// every scale first. The first 64 are always climbed; more only if parts are found and further starts resemble the
+    /// starts of these parts.
     pub max_starts: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
@@ -101,7 +101,7 @@ pub struct Match {
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
-    /// All measurements in the image at that place.
+    /// All measurements in the image at this pose.
     pub evidence: Evidence,
 }
 
@@ -142,7 +142,7 @@ const FOLLOWED_AT_ONCE: usize = 8;
 /// right poses on generated parts have more.
 const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Largest gain of agreement from the agreement's level to full resolution. On the tuned sets it is 0.06 at most for 99
-/// of 100 places; a place that would gain more is not lost, but placed less exactly.
+/// of 100 places; a place that would gain more than `MAX_GAIN` is not lost, but placed less exactly.
 const MAX_GAIN: f64 = 0.1;
 /// Two places overlap for certain if they share this much more of the area than matches may: the share is estimated
 /// from few points, and both places still move by pixels. Chosen by hand.
@@ -155,14 +155,15 @@ const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
 /// Largest distance of a climb from its start, in places. Slightly more than the distance of the next start. Derived
-/// from that, not measured.
+/// from this distance, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
-/// The same in angle and ln scale, in steps of angle.
+/// Largest distance of a climb from its start in angle and ln scale, in steps of angle.
 const FOLLOW_STEPS: f64 = 1.5;
 /// Largest number of matches below `sure_agreement` that are refined again. Chosen by hand, not measured: more take
 /// more time.
 const MAX_NUM_POLISHED: usize = 16;
-/// As many of the best are refined again even if they are probably not the part. Chosen by hand, not measured.
+/// Number of the best matches below `sure_agreement` that are refined again even if probably not the part. Chosen by
+/// hand, not measured.
 const MIN_NUM_POLISHED: usize = 3;
 /// Largest fraction of the part's area in which two matches may overlap. Chosen by hand, not measured.
 const MAX_OVERLAP: f64 = 0.3;
@@ -170,7 +171,7 @@ const MAX_OVERLAP: f64 = 0.3;
 /// Searches whole images for one taught part.
 ///
 /// On 640×480 pixels a search over all scales from 0.75 to 1.3 takes some tens of milliseconds on two cores, and time
-/// grows with the number of pixels; for a part smaller than about 100 pixels it is up to four times that.
+/// grows with the number of pixels; a part smaller than about 100 pixels takes up to four times as long.
 #[derive(Debug, Clone)]
 pub struct ShapeSearch {
     config: SearchConfig,
@@ -245,7 +246,7 @@ impl ShapeSearch {
         self.search_picture(&Picture { image, field: &field, table: &TableColors::new(image) })
     }
 
-    /// As [`search`](Self::search), with the image's data given by the caller because others use it too.
+    /// As [`search`](Self::search), with the image's data given by the caller, because other comparisons also use them.
     pub fn search_picture(&self, picture: &Picture<'_>) -> Vec<Match> {
         let field = picture.field;
         if self.sweep_level_idx >= field.num_levels() || field.width().min(field.height()) == 0 {
@@ -299,8 +300,8 @@ impl ShapeSearch {
         later
     }
 
-    /// Follows climbed starts to full resolution, as long as that finds something. Those that cannot be among the
-    /// matches keep the pose of the agreement's level.
+    /// Follows climbed starts to full resolution, as long as one of the last few reaches [`MIN_FURTHER_AGREEMENT`].
+    /// Starts that cannot be among the matches keep the pose of the agreement's level.
     fn follow(&self, picture: &Picture<'_>, climbed: &[Pose]) -> Vec<Found> {
         let mut all = Vec::new();
         for few in climbed.chunks(FOLLOWED_AT_ONCE) {
@@ -431,7 +432,7 @@ impl ShapeSearch {
     fn range_about(&self, pose: Pose) -> CaptureRange {
         let [least, largest] = [self.config.scales.start().ln(), self.config.scales.end().ln()];
         let turn = FOLLOW_STEPS * self.bank.angle_step_rad;
-        // A change of ln scale moves edges as far as the same angle does.
+        // A change of ln scale moves edges as far as a rotation by as many radians.
         let (low, high) = ((pose.log_scale - turn).max(least), (pose.log_scale + turn).min(largest));
         let shift = FOLLOW_PLACES * self.place_pitch();
         CaptureRange::around(Pose { log_scale: 0.5 * (low + high), ..pose }, [shift, shift, turn, 0.5 * (high - low)])

@@ -170,7 +170,7 @@ impl WithSimd for SweepStretch<'_> {
             sums: vec![vec![-1; len.next_multiple_of(BLOCK)]; groups.count],
             variants: vec![vec![0; len.next_multiple_of(BLOCK)]; groups.count],
         };
-        // Neighbouring variants read nearly the same bytes; block by block, those stay in the first-level cache.
+        // Neighbouring variants read nearly the same bytes; block by block, these bytes stay in the first-level cache.
         for start in (0..len).step_by(BLOCK) {
             let from = (at + start) as isize;
             for (variant_idx, looks) in shifts.iter().enumerate() {

@@ -22,8 +22,7 @@ fn only_a_place_under_a_clearly_better_one_cannot_match() {
     // Shifted by 20 of the plate's 100 pixels, then by 70.
     assert!(cannot(&rough, found(20.0, 0.7)) && !cannot(&rough, found(70.0, 0.7)));
     assert!(!cannot(&rough, found(20.0, 0.55)) && !cannot(&rough, rough));
-    // Without another place it cannot match if, to be listed or refined, it would have to gain more than any place
-    // does.
+    // A place without competitors cannot match if it would have to gain more than `MAX_GAIN` to be listed or refined.
     assert!(!search.cannot_match(&found(0.0, 0.2), [].iter()) && search.cannot_match(&found(0.0, 0.1), [].iter()));
 }
 

@@ -72,7 +72,7 @@ pub struct StepRecord {
 /// One validation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValidationRecord {
-    /// Steps done before it.
+    /// Steps done before the validation.
     pub steps_done: usize,
     /// Seconds since the start of the run.
     pub elapsed_secs: f64,

@@ -1,7 +1,7 @@
 //! The accuracy of a detector on samples on which it was not trained, in pixels of the demonstration and degrees.
 //!
-//! Errors are given in pixels **of the demonstration**, because pixels of the training image depend on its size: in
-//! the demonstration, the millimetres per pixel depend only on the camera's height.
+//! Errors are given in pixels **of the demonstration**, because pixels of the training image depend on its size: in the
+//! demonstration, the millimetres per pixel depend only on the camera and its height.
 
 use sdg_geometry::{Angle, PlanarGrasp, median, percentile};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ pub const HIT_PX: f64 = 9.2;
 /// Maximum angle error of a hit, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
 /// False alarms are counted from the score that this percentage of the hits do not exceed: a score has no meaning
-/// before it is calibrated, and the calibrated threshold rejects about as many.
+/// before it is calibrated, and the calibrated threshold rejects about as many hits.
 const REFUSED_PERCENT: f64 = 10.0;
 /// The score from which false alarms are counted if there was no hit.
 const NO_HIT_SCORE: f64 = 0.5;
@@ -114,9 +114,9 @@ impl Validation {
         if self.positives == 0 { 0.0 } else { self.hits as f64 / self.positives as f64 }
     }
 
-    /// One figure for comparing checkpoints, higher is better: hits, minus imprecision, minus a small penalty for
-    /// false alarms, which the check against the demonstration rejects later anyway. (A larger penalty selected
-    /// networks from a third of the run, whose scores were all low.)
+    /// One figure for comparing checkpoints, higher is better: hits, minus imprecision, minus a small penalty for false
+    /// alarms, which the check against the demonstration rejects later anyway. (A larger penalty selected networks
+    /// after a third of the run, whose scores were all low.)
     pub fn merit(&self) -> f64 {
         let false_alarm_rate = self.false_alarms as f64 / self.negatives.max(1) as f64;
         let imprecision = (self.median_error_px / HIT_PX).min(1.0) + (self.median_error_degrees / HIT_DEGREES).min(1.0);
