@@ -9,6 +9,7 @@ use sdg_evaluation::many_parts::{
     CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page, teach_part,
 };
 use sdg_grasp::TeachOptions;
+use sdg_weights_conversion::sha256_of;
 use serde_json::{Value, json};
 
 use super::teach::{TeachArgs, options, read_base_weights, symmetry};
@@ -22,6 +23,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
     read_base_weights(args, &mut options)?;
     let options = &options;
+    let weights_sha256 = args.base_weights.as_deref().map(sha256_of).transpose()?;
     let demonstrations = DemonstrationFolder::read(folder, symmetry)?;
     let asked = asked_for(args, &demonstrations.parts)?;
     let store = PartStore::open(&args.out)?;
@@ -30,7 +32,7 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     progress.expect(asked.len() + checks);
     let mut outcomes = Vec::with_capacity(asked.len());
     for part in &asked {
-        let key = key(args, part, options)?;
+        let key = key(args, part, options, weights_sha256.as_deref())?;
         let outcome = match store.read(&part.name, &key)? {
             Some(outcome) => outcome,
             None => {
@@ -93,7 +95,12 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
 }
 
 /// The inputs that a part's model depends on.
-fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> Result<Value> {
+fn key(
+    args: &TeachArgs,
+    part: &PartDemonstrations,
+    options: &TeachOptions,
+    weights_sha256: Option<&str>,
+) -> Result<Value> {
     let symmetry = part.symmetry.unwrap_or(options.symmetry);
     Ok(json!({
         "files": part.sha256()?,
@@ -104,7 +111,7 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
         "time_budget": args.time_budget,
         "symmetry": symmetry,
         "size_tolerance": [args.size_tolerance.low, args.size_tolerance.high],
-        "base_weights": args.base_weights,
+        "base_weights_sha256": weights_sha256,
         "reinit": args.reinitialized,
         "version": env!("CARGO_PKG_VERSION"),
     }))
