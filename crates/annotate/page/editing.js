@@ -304,11 +304,11 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   commit();
 }
 
-/** Smaller changes are none: in radians and pixels. */
+/** Smaller changes do not count; in radians and pixels. */
 const MIN_TURN = Math.PI / 360;
 const MIN_MOVE_PX = 0.5;
 
-/** Turns the gripper to the nearer direction of the smallest opening over the part, centres it on the part across the line, and sets the opening. */
+/** Turns the gripper to the smallest opening over the part (of the two opposite directions, to the one nearer to the present), centres it on the part across the line, and sets the opening. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();

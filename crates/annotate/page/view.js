@@ -55,7 +55,7 @@ export function fit() {
   changed();
 }
 
-/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is not reduced, except from `least` as far as the box would not be visible. */
+/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is at least `least`, as far as the box then fits. */
 export function showBox(box, least = state.view.scale) {
   const [x1, y1, x2, y2] = box;
   const { clientWidth, clientHeight } = stage;

@@ -10,7 +10,7 @@ pub fn file_name(path: &Path) -> String {
 /// Combining accents, as in umlauts on macOS.
 const COMBINING: std::ops::RangeInclusive<char> = '\u{300}'..='\u{36f}';
 
-/// The first 60 characters of a name, with `_` in place of those that not every file system accepts.
+/// The first 60 characters of a name, with `_` in place of all except letters, digits, combining accents, `-` and `_`.
 pub fn safe_stem(name: &str) -> String {
     let safe: String = name
         .chars()

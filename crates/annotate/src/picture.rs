@@ -61,7 +61,7 @@ impl Picture {
     }
 
     /// Bytes for a browser, and their media type: the file itself, or a JPEG if browsers do not support the format or
-    /// the stored pixels are rotated, so that coordinates are the same in both.
+    /// the stored pixels are rotated, so that the browser's coordinates are those of the upright picture.
     ///
     /// # Errors
     /// The file has become unreadable.

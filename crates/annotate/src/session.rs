@@ -44,8 +44,8 @@ pub struct SessionOptions {
     pub model_path: Option<PathBuf>,
     /// A camera for taking pictures; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
-    /// The folder of a project; `images` are then empty. Without it, the first image has its own project. The project
-    /// is opened in its last state.
+    /// The folder of a project; `images` are then empty. Without a folder, the project of the first image is used.
+    /// The project is opened in its last state.
     pub project: Option<PathBuf>,
     /// The page's token, for a server that the same page must find again; `None` for a new one.
     pub token: Option<String>,

@@ -209,7 +209,7 @@ impl Served {
         Self::with_patience(PATIENCE)
     }
 
-    /// The same with another maximum silence.
+    /// A server with this maximum silence of connections.
     pub fn with_patience(patience: Duration) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image: PathBuf = folder.path().join("photo.png");
