@@ -10,7 +10,7 @@ import { percent } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const list = by("version-list");
-/** A model that finds a share of the samples smaller by more than this is worse. */
+/** A model whose found share is lower by this or more is worse. */
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };

@@ -1,4 +1,4 @@
-//! Errors of a photo or its annotation, each with the expected and the found value.
+//! Errors of a photo or its annotation, most with the expected and the found value.
 
 use sdg_picture::PictureError;
 use thiserror::Error;

@@ -23,7 +23,7 @@ pub enum AnnotationFormat {
 /// The size of an image according to an annotation file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeclaredImage {
-    /// The image's file name, as written there.
+    /// The image's file name, as written in the annotation file.
     pub file_name: Option<String>,
     /// Width, in pixels.
     pub width: u32,
@@ -48,7 +48,7 @@ impl AnnotationFormat {
     /// Recognises the format by the content.
     ///
     /// # Errors
-    /// Content of none of them.
+    /// Content of no known format.
     pub fn of(bytes: &[u8]) -> Result<Self> {
         if npy::is_npy(bytes) {
             return Ok(Self::OpenDr);
@@ -99,7 +99,7 @@ impl AnnotationFormat {
         Some((field, without_escapes(name?.as_str()?)))
     }
 
-    /// Writes the marks of one image. Reading it back gives the same, except for the contents of `left_out`.
+    /// Writes the marks of one image. Reading the text back gives the same marks, except for those in `left_out`.
     ///
     /// # Errors
     /// [`Error::ReadOnlyFormat`] for OpenDR's.

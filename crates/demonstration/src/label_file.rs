@@ -1,7 +1,7 @@
 //! Label files of test pictures: any number of instances per picture, including none.
 //!
 //! A demonstration marks one part and must have a grasp; a test picture may mark many parts, or none, which means that
-//! the part is absent. Boxes, points and outlines are read by the same code.
+//! the part is absent. Boxes, points and outlines are read by the code for demonstrations.
 
 use serde_json::Value;
 

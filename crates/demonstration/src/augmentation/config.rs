@@ -121,7 +121,7 @@ impl AugmentationConfig {
         Self { output_size: None, style: AugmentationStyle::Paper(PaperStyle::default()) }
     }
 
-    /// The same with samples of `width` × `height` pixels.
+    /// These settings with samples of `width` × `height` pixels.
     pub fn with_output_size(self, width: u32, height: u32) -> Self {
         Self { output_size: Some([width, height]), ..self }
     }

@@ -138,7 +138,7 @@ impl Silhouette {
     }
 
     /// The largest overlap of the mutant's silhouette with the part's over all angles, with equal centres, and areas
-    /// equalised as far as a camera's change of height could.
+    /// equalised as far as another height of the camera could equalise them.
     fn max_iou(&self, mutant: &Mutant) -> f64 {
         let step = mutant.radius / 30.0;
         let mut places = Vec::new();

@@ -67,8 +67,8 @@ impl Component {
         self.log_peak - 0.5 * self.distance_squared(color)
     }
 
-    /// Whether the colour is this one with less light: L* + [`BLACK`], a* and b* are then all smaller by one factor,
-    /// because all are proportional to the cube root of the light.
+    /// Whether the colour is this Gaussian's with less light: L* + [`BLACK`], a* and b* are then all smaller by one
+    /// factor, because all are proportional to the cube root of the light.
     fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
         let shade = (color.x + BLACK) / (self.mean.x + BLACK);
         let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);

@@ -8,7 +8,7 @@
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
 //!         └───────────────────────────◀─────────────────────────────────┤
 //!              the largest piece that runs along edges and reaches the box ─ outer_outline ─ Polygon
-//! strokes ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
+//! strokes ─ the pieces of the picture that they select keep their side; the pixels around the pieces are cut again
 //! ```
 //!
 //! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): the mismatch of each pixel's colour with its side,
@@ -53,8 +53,8 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     propose_outline_with(image, bbox, &[])
 }
 
-/// The same, corrected by strokes in drawing order: each selects the piece of the picture on which it lies. Strokes
-/// outside the box are ignored.
+/// Like [`propose_outline`], corrected by strokes in drawing order: each selects the piece of the picture on which it
+/// lies. Strokes outside the box are ignored.
 pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[OutlineStroke]) -> Polygon {
     outline_in(image, bbox, None, strokes)
 }

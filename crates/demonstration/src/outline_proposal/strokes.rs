@@ -31,7 +31,7 @@ const REACH: f32 = 5.0;
 /// A stroke for the part takes in colours of the table within this many times its distance to the part's border: parts
 /// may have the table's colour.
 const TABLE_REACH: f32 = 1.0;
-/// Minimum value of that distance for [`REACH`], in pixels.
+/// Minimum distance to the part's border that [`REACH`] multiplies, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
 /// Edge strengths at which a selected shadow ends; of these, the one is used that leaves the part whose border runs
 /// most along edges.
@@ -42,11 +42,11 @@ const MIN_SHADOW_PX: f32 = 3.0;
 /// Minimum size of the largest piece that remains without a shadow, as a fraction of the part; otherwise the part has
 /// the shadow's colour.
 const MIN_LEFT: f64 = 0.12;
-/// Minimum size of that piece, as a fraction of all that remains.
+/// Minimum size of the largest remaining piece, as a fraction of all that remains.
 const MIN_IN_ONE_PIECE: f64 = 0.6;
 /// Minimum area of another piece of the same shadow, as a fraction of the part's area.
 const MIN_PIECE_SHARE: f64 = 0.005;
-/// Largest difference of such a piece's mean colour from that under the stroke, in units of L*a*b*.
+/// Largest difference of the other piece's mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
 /// Number of rounds of learning colours and cutting after a stroke.
 const ROUNDS: usize = 3;
