@@ -126,7 +126,7 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface is searched within this number of standard deviations of the expected height.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Minimum and maximum of that search distance, in metres.
+/// Minimum and maximum distance from the expected height at which the surface is searched, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
@@ -171,8 +171,8 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
-    /// Finds the part for a plan, from one picture, which does not measure the part's height. Searches at the given or
-    /// taught height first; if no detection there is sure, takes a second picture and searches at all possible heights.
+    /// Finds the part for a plan, without measuring the part's height. Searches at the given or taught height first; if
+    /// no detection there is sure, takes a second picture and searches at all possible heights.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].

@@ -49,7 +49,7 @@ fn a_coco_file_of_another_tool_has_box_and_outline() {
     assert_eq!((found.label.as_str(), found.bbox), ("fuel_line", expected.bbox));
     assert_eq!(found.grasp, None);
     let mask = |annotation: &Annotation| annotation.outline.as_ref().unwrap().rasterize(640, 480);
-    // That tool stores the outline of whole pixels without their lower right edges; the part is ten pixels wide.
+    // The file stores the outline of whole pixels without their lower right edges; the part is ten pixels wide.
     let overlap = mask(&found).iou(&mask(&expected));
     assert!(overlap > 0.75, "{overlap}");
 }

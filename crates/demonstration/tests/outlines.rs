@@ -8,8 +8,8 @@ use sdg_demonstration::{Demonstration, propose_outline, propose_outline_with};
 use sdg_geometry::{BoundingBox, Polygon};
 
 /// Mean overlap on the paper's eight parts: 0.954 with boxes as drawn, 0.957 with boxes a tenth looser. The minimum is
-/// that of the thin fuel line (0.905 and 0.889). OpenCV's grabCut, with its five rounds, has means of 0.960 and 0.956 on
-/// the same boxes. On all twelve parts: 0.954 and 0.955.
+/// that of the thin fuel line (0.905 and 0.889). OpenCV's grabCut, with its five rounds, has means of 0.960 and 0.956
+/// on the same boxes. On all twelve parts: 0.954 and 0.955.
 const MIN_MEAN_OVERLAP: f64 = 0.93;
 const MIN_OVERLAP: f64 = 0.85;
 

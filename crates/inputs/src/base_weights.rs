@@ -19,8 +19,8 @@ pub type Origin = BTreeMap<String, String>;
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
 /// Reads this project's base weights for the network of `options`, without the parameters with a prefix in
-/// `reinitialized`, and the [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has no
-/// network.
+/// `reinitialized`, and the [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has
+/// no network.
 ///
 /// # Errors
 /// The file cannot be read, the weights are of another preset, or no parameter has a given prefix.

@@ -55,8 +55,8 @@ impl Augmenter {
         Ok(Self { parts, others: Vec::new(), config, frame, seed, noises, normal })
     }
 
-    /// Adds other parts to the distractors: they are cut out of their photos along their outlines. Their other marks are
-    /// not used.
+    /// Adds other parts to the distractors: they are cut out of their photos along their outlines. Their other marks
+    /// are not used.
     ///
     /// # Errors
     /// An annotation that does not lie on its image, or has no outline for cutting out the part.
