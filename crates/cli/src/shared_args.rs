@@ -45,7 +45,7 @@ pub struct ToldHeightArgs {
     /// they contradict each other
     #[arg(long, value_name = "MM", value_parser = height_mm)]
     pub mark_height_mm: Option<f64>,
-    /// Standard deviation of that height
+    /// Standard deviation of --mark-height-mm
     #[arg(long, value_name = "MM", value_parser = sigma_mm, default_value_t = 1.0, requires = "mark_height_mm")]
     pub mark_height_sigma_mm: f64,
 }

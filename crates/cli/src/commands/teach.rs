@@ -74,8 +74,8 @@ pub struct TeachArgs {
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
     /// Smallest and largest size of the part in a picture, relative to its size in the photo: 0.95-1.05 if the camera's
-    /// height is constant, which also distinguishes parts of different sizes; a wider range if it is not, or if the
-    /// photo was both cropped and resized
+    /// height is constant, which also distinguishes parts of different sizes; a wider range if the height varies, or if
+    /// the photo was both cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts

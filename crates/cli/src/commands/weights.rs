@@ -58,7 +58,7 @@ pub struct ConvertArgs {
     /// Store kernels and matrices in half precision, which halves the file
     #[arg(long)]
     pub f16: bool,
-    /// Leave this part at its initial values, such as roi_heads.box_predictor; repeat for several
+    /// Leave parameters with this prefix at their initial values, such as roi_heads.box_predictor; repeat for several
     #[arg(long = "reinit", value_name = "PREFIX")]
     pub reinitialized: Vec<String>,
     /// Print the report as one JSON object
