@@ -2,7 +2,7 @@
 //!
 //! Both run the network of one taught model on one picture: ours as the page does, from the picture file to grasps;
 //! onnxruntime-web runs the export from PyTorch (`peers/export_edge.py`), from the normalised input to keypoints. Each
-//! uses one thread, and they run alternately. Times are reported only if both find the same.
+//! uses one thread, and they run alternately. Times are reported only if both find the same score and keypoints.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -32,7 +32,7 @@ impl Lock {
         Ok(is_taken.then_some(Self(file)))
     }
 
-    /// Whether no process holds the exclusive lock of a file; false without such a file or without locks in the file system.
+    /// Whether no process holds the exclusive lock of a file; false if the file or the file system's locks are missing.
     pub fn is_free(path: &Path) -> bool {
         File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
     }

@@ -150,7 +150,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
     }
 }
 
-/// On SwiftShader, which is part of Chromium: slower than the processor, but with the same shaders.
+/// On SwiftShader, which is part of Chromium: slower than the processor, but with the shaders of a graphics card.
 #[test]
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn the_graphics_card_finds_what_the_command_line_finds() {
@@ -164,7 +164,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
-    // The page itself uses the graphics card and shows the same.
+    // The page itself uses the graphics card and shows the same grasps.
     browser
         .run("document.querySelectorAll('#pictures small').forEach((small) => (small.textContent = ''))", &[])
         .unwrap();
