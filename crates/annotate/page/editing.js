@@ -8,7 +8,7 @@ import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
   return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };

@@ -82,7 +82,7 @@ impl RehearsedPlace {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RehearsalErrors {
     /// Error of the marks' height in the robot's settings, in metres: added in attempts with odd numbers, subtracted in
-    /// the others.
+    /// attempts with even numbers.
     pub mark_height_m: f64,
     /// Errors of the workcell, as a function of the attempt's seed.
     pub of_workcell: Option<fn(u64) -> AttemptErrors>,

@@ -72,7 +72,7 @@ function watchWidth(watched, redraw) {
   });
 }
 
-/** Uses the same model on the other device; if that fails, switches back. */
+/** Uses the open model on the other device; if that fails, switches back. */
 async function changeDevice() {
   stopCamera();
   if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {

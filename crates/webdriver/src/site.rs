@@ -32,7 +32,7 @@ pub fn serve_folder(folder: PathBuf) -> Result<Site> {
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let folder = folder.clone();
-            // A browser opens more connections than it uses; none may block the others.
+            // A browser opens more connections than it uses; no connection may block another.
             std::thread::spawn(move || answer(&stream, &folder));
         }
     });

@@ -93,7 +93,7 @@ impl Course {
         }
     }
 
-    /// Prints the fifth tenth and the last; the tenths before are the start-up. Processor time is compared only if
+    /// Prints the fifth tenth and the last; the first four tenths are the start-up. Processor time is compared only if
     /// every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());

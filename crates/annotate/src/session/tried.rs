@@ -14,7 +14,7 @@ use crate::session_state::{MarkedPicture, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, TrialPictureView, VersionFound};
 
-/// A query whether learning from a picture would help in others.
+/// A query whether learning from a picture would help in other pictures.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HelpQuestion {

@@ -18,7 +18,7 @@ use super::stroke::Stroke;
 /// Largest sum of colour differences on the path to a pixel of the region, in units of L*a*b*. Chosen by hand: a
 /// shadow's edge is about 20 units wide; the steps of an even surface sum to less than 10.
 const MAX_WAY: f32 = 14.0;
-/// Largest difference of a region's pixel from the stroke's pixel from which it is reached, in the same units.
+/// Largest difference of a region's pixel from the stroke's pixel from which it is reached, in units of L*a*b*.
 const MAX_DIFFERENCE: f32 = 24.0;
 /// Added to the colour difference of each step: close pixels come first, and noise does not lead across the whole
 /// picture.

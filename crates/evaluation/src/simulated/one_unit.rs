@@ -32,7 +32,7 @@ pub(super) fn do_unit(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Converts a panic to an error, so that the other units are kept.
+/// Converts a panic to an error, so that the other units continue.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
     // Unwind safety: all data that the closure was changing are dropped with its unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {

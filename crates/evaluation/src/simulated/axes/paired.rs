@@ -1,4 +1,4 @@
-//! Two fractions of the same cases: their difference with its interval, and the number of cases that would show it.
+//! Two fractions of the same cases: their difference with its interval, and the number of cases needed to show it.
 
 use serde::Serialize;
 
