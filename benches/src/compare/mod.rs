@@ -1,4 +1,4 @@
-//! Starts both sides of every work, runs them alternately, and writes medians.
+//! Starts both sides of every chosen work, runs the sides alternately, and writes medians.
 
 pub(crate) mod machine;
 mod pace;

@@ -289,8 +289,8 @@ impl Session {
     /// Writes a shown frame as PNG, under an unused name, and makes it a photo of the object.
     ///
     /// # Errors
-    /// No camera, or a camera with a fault that makes its picture unusable; the frame is no longer kept; the file cannot
-    /// be written.
+    /// No camera, or a camera with a fault that makes its picture unusable; the frame is no longer kept; the file
+    /// cannot be written.
     pub fn take_photo(&self, number: u64) -> Result<ImageView> {
         let frame = self.live_desk()?.photo(number)?;
         let bytes = png(&frame)?;

@@ -1,4 +1,4 @@
-//! Adds an error to every mark of a demonstration.
+//! Adds errors to the marks of a demonstration.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine};
 
-/// Displacement of every mark, in pixels of the photo.
+/// Displacement of the marks, in pixels of the photo.
 pub const MARKS_JITTER_PX: f64 = 3.0;
 
 /// Number of directions tried for a vertex of the outline before it is left in place.
