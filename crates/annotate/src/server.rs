@@ -123,8 +123,8 @@ impl Server {
                 Ok((stream, _)) => stream,
                 // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
-                // Open connections release descriptors when they close. Without open connections, none may ever be
-                // released.
+                // Open connections release descriptors when they close. If no connection is open, a descriptor may
+                // never become free.
                 Err(error) if is_out_of_descriptors(&error) => {
                     let is_idle = connections.available_permits() == MAX_CONNECTIONS;
                     if is_idle && lack_since.get_or_insert_with(Instant::now).elapsed() > MAX_LACK {

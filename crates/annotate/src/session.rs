@@ -76,7 +76,7 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 
 /// A session of the page.
 ///
-/// It calls teaching and previews, which never call it. While the lock on `state` is held, only the lock on the
+/// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the lock on the
 /// teaching's model is taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,

@@ -49,7 +49,7 @@ fn silent_connections_are_closed() {
         (String::new(), vec![]),
         (head.clone(), vec![]),
         (format!("{head}Content-Length: 3\r\n\r\n{{"), vec![]),
-        // Also after a response, when another request might follow.
+        // A connection is also closed after a response, when another request might follow.
         (whole, vec![404]),
     ] {
         let start = Instant::now();

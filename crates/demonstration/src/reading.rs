@@ -76,8 +76,8 @@ impl MarksReading {
     }
 }
 
-/// The reading in which the marks fit the photo far better than as they are, or [`MarksReading::OtherPhoto`]; `None` if
-/// they may be right, if one covers most of the photo, or if there are none.
+/// The reading in which the marks fit the photo far better than unchanged, or [`MarksReading::OtherPhoto`]. `None` if
+/// the marks may be right, if one part covers most of the photo, or if there are no marks.
 pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksReading> {
     let pixels = f64::from(image.width()) * f64::from(image.height());
     let is_crop = |annotation: &&Annotation| annotation.region().area() > MAX_COVER * pixels;

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Result, WebDriverError};
 
-/// A served folder; its thread ends with the process.
+/// A folder that is served until the process ends.
 #[derive(Debug)]
 pub struct Site {
     address: SocketAddr,

@@ -140,7 +140,7 @@ fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
     page.draw_box();
     page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
     page.settle();
-    // From the part, so that the area is connected with it.
+    // Strokes start on the part, so that the selected area is connected with the part.
     let stroke = |[x, y]: [f64; 2]| {
         page.click("button[data-tool=in]");
         let middle = [0.5 * (HOLD[0] + x), 0.5 * (HOLD[1] + y)];
