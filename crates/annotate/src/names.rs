@@ -56,7 +56,8 @@ const ANY_PICTURE: [&str; 14] = [
     "webcam",
 ];
 
-/// The proposed name of the part on a photo: the photo's name; if it is generic, the folder's name; if both are, `part`.
+/// The proposed name of the part on a photo: the photo's name; if it is generic, the folder's name; if both are,
+/// `part`.
 pub fn proposed_label(photo: Option<&Path>, folder: &Path) -> String {
     let says_something = |name: &String| {
         let letters: String = name.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();

@@ -76,8 +76,8 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 
 /// A session of the page.
 ///
-/// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the lock on the
-/// teaching's model is taken, never the reverse.
+/// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the
+/// lock on the teaching's model is taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,

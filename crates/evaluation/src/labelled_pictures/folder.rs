@@ -1,8 +1,9 @@
 //! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture. A file with the labels of one picture belongs to the picture with the file's name, even
-//! if another picture is named in the file, because people rename files. Every other label file belongs to the pictures that it names.
+//! COCO beside the picture. A file with the labels of one picture belongs to the picture with the file's name, even if
+//! another picture is named in the file, because people rename files. Every other label file belongs to the pictures
+//! that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

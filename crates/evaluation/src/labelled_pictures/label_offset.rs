@@ -99,8 +99,8 @@ pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     })
 }
 
-/// Each detection that hits no instance, relative to the nearest label that was not found. Detections and labels
-/// are assigned one to one, in order of decreasing score.
+/// Each detection that hits no instance, relative to the nearest label that was not found. Detections and labels are
+/// assigned one to one, in order of decreasing score.
 fn beside_labels(tested: &Tested, min_score: f64) -> Vec<Beside> {
     let judged = judge(tested, min_score);
     let mut free: Vec<&TrueGrasp> = tested
