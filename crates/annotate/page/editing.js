@@ -164,7 +164,7 @@ function snapBox(marks) {
 /** The last detection of an outline: the next one begins after it. */
 let lastProposal = Promise.resolve();
 
-/** Places the gripper again after a stroke changed the outline: one that was placed by a click or turned to fit and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
+/** Places the gripper again after a stroke changed the outline. A gripper that a person has drawn or changed stays if its middle is still on the part. Returns whether the middle was beside the part. */
 function followOutline(target) {
   const { grasp, outline } = target.marks;
   if (!grasp) return false;
@@ -308,7 +308,7 @@ export function adjustGripper({ turn = 0, open = 0 }) {
 const MIN_TURN = Math.PI / 360;
 const MIN_MOVE_PX = 0.5;
 
-/** Turns the gripper to the smallest opening over the part (of the two opposite directions, to the one nearer to the present), centres it on the part across the line, and sets the opening. */
+/** Turns the gripper to the smallest opening over the part, by at most a quarter turn, centres it on the part across the line, and sets the opening. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();

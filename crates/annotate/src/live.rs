@@ -1,7 +1,7 @@
 //! Live pictures from any implementation of [`LivePictures`].
 //!
-//! A frame that was shown on the page is kept for a while, so that the photo taken is the frame that the person saw,
-//! and detections are drawn on the frame in which they were found.
+//! Frames shown on the page are kept for a while: a photo is the frame that the person saw, and detections are drawn on
+//! the frame in which they were found.
 
 use std::collections::VecDeque;
 use std::fmt;

@@ -120,7 +120,7 @@ const SIZE_LEEWAY: f64 = 0.03;
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
 /// In a picture for measuring a height: maximum horizontal distance of the part from its expected position, in metres.
 const SAME_PART_M: f64 = 0.040;
-/// Maximum relative difference between the demonstrations' sizes. Above it, no height is derived from the size.
+/// Maximum relative difference between the demonstrations' sizes for deriving a part's height from its size.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 /// Margin added to the height of the part's top, in metres.
 const TOP_LEEWAY_M: f64 = 0.002;
@@ -277,7 +277,7 @@ impl<P> ModelFinder<P> {
     }
 
     /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the demonstrations' sizes
-    /// differ, or if the picture was not compared with them.
+    /// differ, or if the picture was not compared with a demonstration.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();

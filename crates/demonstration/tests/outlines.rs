@@ -137,8 +137,8 @@ fn hard_shadows_are_left_out() {
 /// Minimum fraction of a shadow, beside the part, for an outline that includes it.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// A shadow is removed if the outline is nearly as good as that of the same photo without the shadow: it has at most
-/// this much more of the shadow's area.
+/// A shadow is removed if the outline includes a fraction of it that is larger by at most this than in the outline
+/// proposed on the same photo without the shadow.
 const SHADOW_OUT: f64 = 0.15;
 /// The outline must also keep this fraction of the overlap that the photo without the shadow gives.
 const OVERLAP_KEPT: f64 = 0.9;

@@ -137,7 +137,7 @@ fn frames(places: &Places) -> Result<Vec<Vec<u8>>> {
     (0..NUM_FRAMES).map(moved).collect()
 }
 
-/// The model file of a letter, taught once.
+/// The path of the model with this letter, which is taught if the file is missing.
 fn model(places: &Places, letter: &str) -> Result<String> {
     let folder = places.work.join("once");
     fs::create_dir_all(&folder)?;

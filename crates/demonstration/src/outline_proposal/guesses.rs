@@ -1,8 +1,8 @@
 //! Several guesses of the part, each cut, and the choice of the cut that a person meant with the box.
 //!
-//! The constants of the choice were fitted on 30 pictures of generated parts (seeds from 2^51, boxes as drawn and
-//! looser by a twelfth), on the shipped demonstrations, and on the five photographs that docs/comparison-with-tools.md
-//! reports; not on the tests' pictures.
+//! The constants of the choice were not fitted on the tests' pictures, but on 30 pictures of generated parts (seeds
+//! from 2^51, boxes as drawn and looser by a twelfth), the shipped demonstrations, and the five photographs of
+//! docs/comparison-with-tools.md.
 
 use super::color_mixture::ColorMixture;
 use super::frame::Frame;
@@ -80,8 +80,8 @@ impl Cut {
     }
 }
 
-/// Initial divisions of the frame, with and without additional colours of the surroundings: those of the whole photo
-/// identify a shadow, but if another object resembles the part, its colours would assign the part to the surroundings.
+/// Initial divisions of the frame, with and without the colours of the whole photo as surroundings. These colours
+/// identify a shadow, but if another object resembles the part, they would assign the part to the surroundings.
 fn guesses<'a>(frame: &'a Frame, surroundings: Option<&ColorMixture>) -> Vec<Guess<'a>> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()

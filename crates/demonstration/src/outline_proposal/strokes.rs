@@ -109,8 +109,8 @@ impl<'a> Correction<'a> {
         (RADIUS_SHARE * (self.frame.width as f64).hypot(self.frame.height() as f64)) as f32
     }
 
-    /// All of the part that belongs to the shadow under a stroke, on both sides of the part, and the fraction along
-    /// edges of the remaining part; `None` if there is no shadow under it.
+    /// The shadow under a stroke, as pixels of the part; before it, the fraction of the remaining part's border that
+    /// runs along edges. `None` if there is no shadow under the stroke.
     fn shadow(&self, stroke: &Stroke, max_edge: f32) -> Option<(f64, Vec<bool>)> {
         let Self { frame, in_part, pinned, .. } = self;
         let surroundings = self.surroundings.as_ref().filter(|_| !stroke.is_inside)?;

@@ -149,7 +149,7 @@ pub struct GraspFigures {
     pub held: Share,
     /// 95 % confidence interval (Wilson) of `held`.
     pub held_interval: [f64; 2],
-    /// Attempts that held the part, and found it in the first picture both from afar and from above; of all attempts.
+    /// Attempts that held the part after one picture from afar and one from above, of all attempts.
     pub held_at_first_look: Share,
     /// Attempts that held the part after further pictures, of all attempts.
     pub held_after_further_looks: Share,
