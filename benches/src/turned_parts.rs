@@ -141,7 +141,7 @@ mod tests {
         read_demonstration(&root).unwrap()
     }
 
-    /// In grey values: the effect of interpolation on the photo's noise and print.
+    /// Maximum mean difference in grey values; interpolation changes the photo's noise and print.
     const MAX_DIFFERENCE: f64 = 3.0;
 
     #[test]

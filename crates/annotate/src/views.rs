@@ -78,7 +78,7 @@ pub struct ModelView {
     pub summary: TaughtSummary,
     /// Number of photos that it was taught from.
     pub photos: usize,
-    /// Number of pictures without the part that it was taught from.
+    /// Number of pictures without the part in its teaching.
     pub negatives: usize,
     /// Whether this version is in use.
     pub is_current: bool,

@@ -149,7 +149,7 @@ impl Annotation {
     /// or the other one of OpenDR's two files.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read), and a second file that does not match.
+    /// The errors of [`read`](Self::read); or the second file does not match.
     pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
         AnnotationFormat::of(bytes)?.read(bytes, beside, image)
     }

@@ -7,8 +7,8 @@
 //! Labels are in a `data.yaml`; classes are indices into its `names`, and its `kpt_shape` defines the format of a line.
 //!
 //! # Source
-//! The dataset format of Ultralytics' pose models. As in its loader, a byte order mark and blank lines are accepted.
-//! Coordinates may be up to a pixel outside the image; in its loader, up to a hundredth of the image. Lines that begin
+//! The dataset format of Ultralytics' pose models. As in Ultralytics' loader, a byte order mark and blank lines are
+//! accepted. Coordinates may be up to a pixel outside the image; in that loader, up to a hundredth of the image. Lines that begin
 //! with `#` are comments, and skipped.
 
 use std::fmt::Write;
