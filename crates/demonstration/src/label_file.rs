@@ -76,8 +76,8 @@ impl LabelFile {
     /// The marks of one picture, in the file's order; empty if the part is absent.
     ///
     /// # Errors
-    /// The errors of [`Annotation::read`], except [`Error::NoObject`] for a picture without marks, and except the errors
-    /// of boxes and outlines across the picture's border. A grasp must lie inside.
+    /// The errors of [`Annotation::read`], except [`Error::NoObject`] for a picture without marks, and except the
+    /// errors of boxes and outlines across the picture's border. A grasp must lie inside.
     pub fn instances(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let root = Node::root(&self.value);
         match self.format {

@@ -8,8 +8,8 @@
 //!
 //! # Source
 //! The dataset format of Ultralytics' pose models. As in Ultralytics' loader, a byte order mark and blank lines are
-//! accepted. Coordinates may be up to a pixel outside the image; in that loader, up to a hundredth of the image. Lines that begin
-//! with `#` are comments, and skipped.
+//! accepted. Coordinates may be up to a pixel outside the image; in that loader, up to a hundredth of the image. Lines
+//! that begin with `#` are comments, and skipped.
 
 use std::fmt::Write;
 
