@@ -138,9 +138,9 @@ impl Annotation {
     /// Reads every object that a file marks on the image; the content determines the [`AnnotationFormat`].
     ///
     /// # Errors
-    /// An invalid file, one made on an image of another size, and every invalid [`Annotation`]: outside the image by
-    /// more than a pixel, without extent, not finite, half a grasp line, an outline of fewer than three points or one
-    /// that crosses itself. Several objects need group ids (LabelMe). The message gives the position.
+    /// An invalid file; a file for an image of another size; several LabelMe objects without group ids. Marks that are
+    /// outside the image by more than a pixel, without extent or not finite; half a grasp line; an outline of fewer
+    /// than three points, or one that crosses itself. The message gives the position.
     pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
         Self::read_with(bytes, None, image)
     }

@@ -15,8 +15,8 @@
 //! and the boundary's length, which is cheaper along edges of the picture. There are three differences. A part's shadow
 //! is mostly inside the box and would be learnt as the part's colour, so that one guess excludes colours of the
 //! surroundings in shadow. No single guess suits every photo, so that several are cut and compared by the meaning of a
-//! person's box: the part's outline runs along edges, and reaches the box. The cut is found as a convex problem, whose
-//! boundaries have no preference for the pixels' axes, in 60 passes over the picture, instead of by a maximum flow.
+//! person's box: the part's outline runs along edges, and reaches the box. The cut is not found by a maximum flow, but as
+//! a convex problem, in 60 passes over the picture: its boundaries have no preference for the pixels' axes.
 //!
 //! It uses no knowledge of parts, and no randomness. The same photo and box give the same outline.
 

@@ -33,8 +33,8 @@ const REACH: f32 = 5.0;
 const TABLE_REACH: f32 = 1.0;
 /// Minimum distance to the part's border that [`REACH`] multiplies, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// Edge strengths at which a selected shadow ends; of these, the one is used that leaves the part whose border runs
-/// most along edges.
+/// Edge strengths at which a selected shadow ends. Each is tried, and the shadow is removed that leaves the part with
+/// the largest fraction of its border along edges.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
 /// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
 /// shadow.

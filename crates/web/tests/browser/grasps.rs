@@ -18,9 +18,9 @@ const MAX_SCORE: f64 = 0.01;
 /// kept, and this changes the network's score (by 0.036 in one of the pictures). The grasp does not depend on this
 /// choice, because the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
-/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is five
-/// per second (200 ms): measured 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which
-/// this bound leaves room.
+/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is
+/// 200 ms. Measured: 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which this bound
+/// leaves room.
 const MAX_MILLISECONDS: f64 = 300.0;
 /// Number of timed searches, after those in which the module's functions are compiled.
 const LOOKS: usize = 7;
