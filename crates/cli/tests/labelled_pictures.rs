@@ -204,7 +204,7 @@ struct Case {
 impl Case {
     fn new(name: &str, labels: &str) -> Self {
         let case = Self { folder: tempfile::tempdir().unwrap() };
-        // The shipped photo with one changed row of pixels, so that the model was not taught from this picture.
+        // The shipped photo with one changed row of pixels, so the model was not taught from this picture.
         let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
         let [width, height] = [picture.width(), picture.height()];
         for x in 0..width {

@@ -71,7 +71,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
 /// The category of an annotation, if the file has it.
 ///
 /// # Errors
-/// Two categories of one id with different keypoint names, so that the grasp's start is unknown.
+/// Two categories of one id with different keypoint names: the grasp's start is unknown.
 fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<Option<&'b Node<'a>>> {
     let Some(id) = annotation.optional("category_id")? else { return Ok(None) };
     let mut of_id =

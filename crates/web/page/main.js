@@ -197,7 +197,7 @@ async function detectInPicture(picture, mine) {
       picture.small.textContent = error.message;
     }
   }
-  // After the search, which rejects files that are not pictures or are too large to be shown.
+  // Decoded for display only after the search, because the search rejects files that are no pictures or are too large.
   if (!picture.bitmap && !picture.error) {
     picture.bitmap = await shownBitmap(picture.file).catch(() => null);
     if (picture.bitmap) {

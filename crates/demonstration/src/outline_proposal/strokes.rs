@@ -3,8 +3,8 @@
 //! A stroke on the wrong side of the cut selects the whole piece of the picture there: the pixels reached from the
 //! stroke by small steps of colour, without leaving the wrong side. A stroke over a shadow selects the whole shadow:
 //! colours of the surroundings in the shadow under the stroke, and in weaker ones. The part is then cut again, and the
-//! changes near the stroke are applied. People draw into the middle of the wrong area, so that the distance from the
-//! stroke to the part's border indicates the size of that area.
+//! changes near the stroke are applied. People draw into the middle of the wrong area, so the distance from the stroke
+//! to the part's border indicates the size of that area.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

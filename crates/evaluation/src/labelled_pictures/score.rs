@@ -372,7 +372,7 @@ mod tests {
     use super::*;
     use sdg_grasp::TurnSource;
 
-    /// An instance with a diagonal of 100 pixels, so that hits are within 4 pixels.
+    /// An instance with a diagonal of 100 pixels, so hits are within 4 pixels.
     fn truth(x: f64, degrees: f64, optional: bool) -> Truth {
         let grasp = TrueGrasp {
             center: Point2::new(x, 50.0),

@@ -27,7 +27,7 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     };
     let same =
         |x: u32, y: u32, dy: u32| picture.as_raw()[row(picture, x, y + dy)] == cutout.as_raw()[row(cutout, 0, dy)];
-    // The part crosses the middle row, so that few positions pass this test even on a plain background.
+    // The part crosses the middle row, so few positions pass this test even on a plain background.
     let middle = height / 2;
     for y in 0..=picture.height() - height {
         for x in 0..=picture.width() - width {
