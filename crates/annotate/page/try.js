@@ -168,7 +168,7 @@ function teachButton() {
   }, isRunning() ? "" : "primary");
 }
 
-/** States that the part is not in this picture, or revokes that. */
+/** States that the part is not in this picture, or revokes the statement. */
 async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));

@@ -72,8 +72,8 @@ impl Session {
         Ok(state.trial_picture_view(id))
     }
 
-    /// Declares that the part is not in a tried picture, which becomes a negative of the next teaching; or revokes
-    /// this.
+    /// Declares that the part is not in a tried picture, which becomes a negative of the next teaching; or revokes the
+    /// declaration.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration, or the project cannot be written.
