@@ -18,7 +18,7 @@ const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// Time without a complete frame after which torn frames are a fault: single ones are common with cheap cameras.
 const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
-/// The newest picture of a camera, which a thread reads until the camera ends or fails.
+/// The newest picture of a camera. A thread reads the camera until the camera ends or fails.
 #[derive(Debug)]
 pub struct CameraPictures(Arc<Mutex<Newest>>);
 

@@ -149,7 +149,7 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
     draft.finish(image)
 }
 
-/// Refuses a row that may be corners of an oriented box or of a segment, which have as many numbers as a box and
+/// Refuses a row that may be corners of an oriented box or of a segment: such rows have as many numbers as a box and
 /// keypoints without visibilities.
 fn check_is_pose(line: &str, place: &str) -> Result<()> {
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();

@@ -276,7 +276,7 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     fs::create_dir(folder.join("state"))?;
     let demonstrations = places.root.join("datasets/demonstrations/pendulum");
     let photo = fs::read(demonstrations.join("image.png"))?;
-    // The marks in the form that the page expects, which it reads from the shipped file.
+    // The page reads the shipped marks and returns them in the form that it expects.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
     let mut server =
