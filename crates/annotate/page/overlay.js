@@ -47,7 +47,7 @@ function line(key, parent, d) {
   element(`${key}/line`, "path", { class: "line", d }, parent);
 }
 
-/** A handle for mouse, finger and keyboard. Its role is in its data. */
+/** A handle for mouse, finger and keyboard; `data` states what the handle moves. */
 function handle(key, parent, data, label, classes = "") {
   const attributes = { class: `handle ${classes}`, tabindex: 0, role: "button", "aria-label": label };
   for (const [name, value] of Object.entries(data)) attributes[`data-${name}`] = value;

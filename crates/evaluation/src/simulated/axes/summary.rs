@@ -129,7 +129,7 @@ pub struct LookAlikeFigures {
 }
 
 impl LookAlikeFigures {
-    /// The sum over look-alikes of the part's size.
+    /// The sum over look-alikes that are as large as the part.
     pub const SAME_SIZE: &str = "same size";
     /// The sum over look-alikes that differ only in size, which is not visible without a calibrated camera.
     pub const SIZE_ALONE: &str = "size alone";
