@@ -14,7 +14,7 @@ use std::process::{Command, Output};
 use image::RgbImage;
 use sdg_demonstration::{Annotation, ImageFacts};
 
-/// Runs `sdg` and waits until it exits. Fields of its JSON that no document describes fail the test.
+/// Runs `sdg` and waits until it exits. Fields of the printed JSON that no document describes fail the test.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap();
     documented::assert_fields_are_documented(arguments, &output.stdout);
