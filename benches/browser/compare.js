@@ -40,7 +40,7 @@ async function theirs() {
   };
 }
 
-/** Times of every run, and the last result of each side, so that both can be seen to have done the same. */
+/** Times of every run, and the last result of each side, so that the results can be compared. */
 window.compare = async (rounds, warmUps) => {
   const [look, run] = [await ours(), await theirs()];
   const times = { network: [], verified: [], theirs: [] };

@@ -1,8 +1,8 @@
 //! `sdg-bench browser`: the page's detection compared with onnxruntime-web, in one page of a headless Chromium.
 //!
-//! Both run the network of one taught model on one picture: ours as the page does, from the picture file to grasps;
-//! onnxruntime-web runs the export from PyTorch (`peers/export_edge.py`), from the normalised input to keypoints. Each
-//! uses one thread, and they run alternately. Times are reported only if both find the same.
+//! Both sides run the network of one taught model on one picture, alternately and each on one thread. Our side runs as
+//! on the page, from the picture file to grasps. onnxruntime-web runs the export from PyTorch (`peers/export_edge.py`),
+//! from the normalised input to keypoints. Times are reported only if both sides find the same score and keypoints.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -52,7 +52,7 @@ impl Network {
     }
 
     /// Writes weights from a fixed seed, scaled so that values stay of order one through R50's sixteen blocks,
-    /// because there are no trained norms to keep them so.
+    /// because there are no trained norms that limit them.
     pub fn write_weights(self, out: &Path) -> Result<()> {
         let mut weights = state_dict::export(&self.config().init(&Device::flex(), SEED)?);
         for (name, weight) in &mut weights {

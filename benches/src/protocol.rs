@@ -6,7 +6,7 @@
 //! worker: {"seconds": s}                                                        n times
 //! ```
 //!
-//! A worker ends at the end of its standard input. `peers/protocol.py` implements the same in Python.
+//! A worker ends at the end of its standard input. `peers/protocol.py` implements this protocol in Python.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};

@@ -1,4 +1,4 @@
-//! The pictures and their ground truth, by the same formulas as `peers/scene.py`, so that both sides get the same.
+//! The pictures and their ground truth, by the formulas of `peers/scene.py`, so that both sides get the same pictures.
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;

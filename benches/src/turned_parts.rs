@@ -7,7 +7,7 @@ use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{Angle, BoundingBox, GraspLine, PlanarSimilarity, Polygon};
 
-/// Side of the square of bare table in the photo's upper left corner, which is repeated as the table of the pictures.
+/// Side of the square in the photo's upper left corner: it shows bare table, and is repeated as the pictures' table.
 const TABLE_PX: u32 = 64;
 /// Samples per side of a pixel at the part's outline.
 const SAMPLES: u32 = 3;
@@ -141,7 +141,7 @@ mod tests {
         read_demonstration(&root).unwrap()
     }
 
-    /// In grey values: the effect of interpolation on the photo's noise and print.
+    /// Maximum mean difference in grey values; interpolation changes the photo's noise and print.
     const MAX_DIFFERENCE: f64 = 3.0;
 
     #[test]

@@ -1,4 +1,4 @@
-//! Hostile input for every reader of files and messages from outside.
+//! Hostile input for the readers of files and messages from outside.
 //!
 //! ```text
 //! corpus (targets: seeds) ─ mutator, by number ─ one target ─ accepted, or rejected with an error

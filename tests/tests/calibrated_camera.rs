@@ -1,4 +1,4 @@
-//! A part taught with one calibrated camera and detected with others: other poses, tilts and lenses.
+//! A part taught with one calibrated camera and detected with other cameras: other poses, tilts and lenses.
 
 use std::ops::ControlFlow;
 

@@ -15,7 +15,7 @@ const VIEWS_SEED: u64 = 7000;
 const NUM_PRESENT: usize = 6;
 const NUM_ABSENT: usize = 2;
 /// Maximum median distance from the true grasp on the pictures of one part, and on all of them. The evaluation measured
-/// 0.3 to 1.7 mm, and 0.6.
+/// 0.3 to 1.7 mm for single parts, and 0.6 mm for all.
 const MAX_MEDIAN_OF_PART_MM: f64 = 2.3;
 const MAX_MEDIAN_MM: f64 = 0.9;
 /// Number of grasps of each part.

@@ -15,7 +15,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
 use sdg_simulation::views::demonstration_view;
 
-/// Number of frames that a search takes: 100 to 200 ms on one of two cores that are also used by others
+/// Number of frames that a search takes: 100 to 200 ms on one of two cores that other processes also use
 /// (docs/tracking.md).
 const SEARCH_FRAMES: u32 = 20;
 /// The promised accuracy: 95 % of the frames within these errors.

@@ -22,8 +22,8 @@ impl Machine {
         format!("{processor}, {cores} cores ({instructions}), {memory_gib:.0} GiB; commit {commit}")
     }
 
-    /// Reads the facts from the system; a processor or commit that it does not report is "unknown", and such a memory
-    /// is 0.
+    /// Reads the facts from the system. A processor or commit that the system does not report is "unknown", and an
+    /// unknown memory is 0.
     pub fn read() -> Self {
         let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let memory = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Starts both sides of every work, runs them alternately, and writes medians.
+//! Starts both sides of every chosen work, runs the sides alternately, and writes medians.
 
 pub(crate) mod machine;
 mod pace;
@@ -52,7 +52,7 @@ fn known_works() -> String {
     format!("Works: {}", names.join(", "))
 }
 
-/// Maximum relative difference between the facts of the same work: sums are added in different orders, ties
+/// Maximum relative difference between both sides' facts of a work: sums are added in different orders, ties
 /// are broken differently.
 const SAME_WORK: f64 = 0.01;
 

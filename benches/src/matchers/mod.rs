@@ -7,8 +7,8 @@
 //! sets of a split, without its reported side ──┘           └─ peers/matchers.py, one process per peer
 //! ```
 //! All sides process a picture before the next one, starting with another side each time. Our side accepts detections
-//! from a score of 0.5. The peers have no such threshold, so each gets the best one for the same set (most found parts
-//! minus wrong detections and false alarms), which a user cannot know beforehand.
+//! from a score of 0.5. The peers have no such threshold. Each peer gets the threshold with the largest number of found
+//! parts minus wrong detections and false alarms on the same set; a user cannot know it beforehand.
 
 mod counts;
 mod peer;

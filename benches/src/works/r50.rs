@@ -23,7 +23,7 @@ use crate::works::facts::{facts, mean};
 /// Columns and rows of parts in a picture.
 const GRID: (u32, u32) = (8, 4);
 const BATCH: u32 = 2;
-/// Detectron2's solver, except for the learning rate, which hardly changes the weights, so the hundredth step does
+/// Detectron2's solver, with a learning rate that hardly changes the weights, so the hundredth step does
 /// the same work as the first.
 const LEARNING_RATE: f64 = 1e-5;
 const MOMENTUM: f64 = 0.9;

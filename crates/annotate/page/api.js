@@ -10,7 +10,7 @@ export class RequestError extends Error {
 
 /**
  * Whether the server is gone: false, true, or "key" if it was restarted with another token. A response alone does not
- * reset this: a restarted server has renumbered its pictures, and nothing is sent before the numbers are known.
+ * reset this: a restarted server has renumbered its pictures, and marks are not sent before the numbers are known.
  */
 let lost = false;
 const lossListeners = [];
@@ -27,7 +27,7 @@ export function setLost(now) {
 /** Waits until the server is back and its picture numbers are known. */
 export const present = () => new Promise((resolve) => (lost ? waiting.push(resolve) : resolve()));
 
-/** The session of the picture numbers; the server rejects those of another one. */
+/** The session of the picture numbers; the server rejects numbers of another session. */
 let sessionId = null;
 export function belongTo(session) {
   sessionId = session.id;

@@ -5,18 +5,18 @@ import { listText } from "./words.js";
 
 /** A hand turned by more than this is another grasp. */
 const MAX_TURN = (20 * Math.PI) / 180;
-/** So is a hand moved by more than this share of the part's length. */
+/** A hand moved by more than this share of the part's length is another grasp. */
 const MAX_MOVE = 0.1;
 const MAX_NAMES = 30;
 const WORDS = { less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere", more: "more is found" };
 
 /**
- * The change from the marks of some detections to those of others: "more" or "less" are found, or a hand is "turned"
- * or "moved"; null if there is none. `turns`: number of turns in which the part looks the same, 0 for any.
+ * The change from the marks `before` to the marks `after`: "more" or "less" are found, or a hand is "turned" or
+ * "moved"; null without a change. `turns`: number of turns in which the part looks the same, 0 for any.
  */
 export function changeOf(before, after, turns) {
   if (after.length !== before.length) return after.length > before.length ? "more" : "less";
-  // A part that looks the same when turned may be held at the opposite place: then its own middle is compared.
+  // A part that looks the same when turned may be held at the opposite place: then the middle of its box is compared.
   const place = ({ box: [x1, y1, x2, y2], grasp }) => (turns === 1 ? gripperOf(grasp).center : times([x1 + x2, y1 + y2], 0.5));
   const left = [...after];
   let change = null;

@@ -8,7 +8,7 @@ import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
   return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
@@ -164,7 +164,7 @@ function snapBox(marks) {
 /** The last detection of an outline: the next one begins after it. */
 let lastProposal = Promise.resolve();
 
-/** Places the gripper again after a stroke changed the outline: one that was placed by a click or turned to fit and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
+/** Places the gripper again after a stroke changed the outline. A gripper that a person has drawn or changed stays if its middle is still on the part. Returns whether the middle was beside the part. */
 function followOutline(target) {
   const { grasp, outline } = target.marks;
   if (!grasp) return false;
@@ -304,11 +304,11 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   commit();
 }
 
-/** Smaller changes are none: in radians and pixels. */
+/** Smaller changes do not count; in radians and pixels. */
 const MIN_TURN = Math.PI / 360;
 const MIN_MOVE_PX = 0.5;
 
-/** Turns the gripper to the nearer direction of the smallest opening over the part, centres it on the part across the line, and sets the opening. */
+/** Turns the gripper to the smallest opening over the part, by at most a quarter turn, centres it on the part across the line, and sets the opening. */
 export function turnToFit() {
   const { grasp } = marks();
   const part = region();

@@ -19,7 +19,7 @@ function field(value) {
   return /[",\n']/.test(plain) ? `"${plain.replaceAll('"', '""')}"` : plain;
 }
 
-/** The numbers of the detections that its jaws touch. */
+/** The numbers of the detections that the jaws of `detection` touch. */
 const touched = (detection, { detections }) => touchedBy(detection, detections).map((other) => detections.indexOf(other) + 1);
 
 function rows(trial) {

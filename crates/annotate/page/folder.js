@@ -58,7 +58,7 @@ const takeTrials = (ids) => take(async () => {
   }
 });
 
-/** A photo from elsewhere is copied beside the others. */
+/** A photo from elsewhere is copied beside the first photo. */
 export const uploadPhoto = (file) => take(async () => {
   took(await api.uploadPhoto(file));
   dialog.close();

@@ -43,7 +43,7 @@ function footOn(point, a, b) {
   return add(a, times(along, clamp(dot(sub(point, a), along) / (dot(along, along) || 1), 0, 1)));
 }
 
-/** Distance from a point to that point. */
+/** Distance from a point to the edge from `a` to `b`. */
 export const distanceToEdge = (point, a, b) => norm(sub(point, footOn(point, a, b)));
 
 /** Distance from a point to a polygon's outline. */
@@ -127,7 +127,7 @@ function sidePoints({ center, angle, width }, part, half) {
   return sides;
 }
 
-/** The common slope of both sides and their points' distance from it; null if a side is missing. */
+/** The common slope of both sides, and the distance of their points from lines of that slope; null if a side is missing. */
 function commonSlope(sides, half) {
   if (sides.some((side) => side.length < Math.max(half, 3))) return null;
   const mean = (points, axis) => points.reduce((sum, p) => sum + p[axis], 0) / points.length;

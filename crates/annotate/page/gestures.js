@@ -191,7 +191,7 @@ function nearestVertex(place) {
   return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
 }
 
-/** The mark that is dragged from a place: between the jaws it is the gripper if its line is closer than the outline, whose reach covers thin parts. */
+/** The mark that is dragged from a place. On a thin part the outline can be grabbed everywhere; therefore between the jaws the closer of outline and gripper line is dragged. */
 function takenAt(target, from) {
   const taken = target.closest?.("[data-kind]");
   const { grasp, outline } = marks();

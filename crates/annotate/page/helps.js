@@ -1,4 +1,4 @@
-// After the first refusals: which of the refused pictures would help most in the others, if the model learnt from it.
+// After the first refusals: which of the refused pictures would help most in the other pictures, if the model learnt from it.
 //
 // For each of the few best candidates a trial model is taught, and the other pictures are searched with it. This is
 // done with model S only, which is taught in a second. Only the user knows whether the part is where it was refused.
@@ -9,7 +9,7 @@ import { isFound, isLive, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
-/** Below this score nothing resembles the part. The same value as in found_text.rs. */
+/** Below this score nothing resembles the part. Equal to MIN_ADVISED_SCORE in found_text.rs. */
 const MIN_LIKE = 0.03;
 const MAX_CANDIDATES = 3;
 const MAX_OTHERS = 8;

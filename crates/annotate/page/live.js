@@ -58,7 +58,7 @@ async function run() {
   running = false;
 }
 
-/** Shows the newest frame, while the model is tried with its own detections; returns whether the frame was new. */
+/** Shows the newest frame, with its detections while the model is tried; returns whether the frame was new. */
 async function look() {
   const { live } = state;
   const now = await api.live();

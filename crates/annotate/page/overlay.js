@@ -11,7 +11,7 @@ const overlay = document.getElementById("overlay");
 const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 /** Distance between the end of the line and its knob, so that knob and jaws stay apart however small the gripper is. */
 export const KNOB_PX = 20;
-/** The same distance for the dots of a detection, which are not dragged. */
+/** Like `KNOB_PX`, for the dots of a detection, which are not dragged. */
 const DETECTED_OUT_PX = 8;
 const JAW_PX = 12;
 /** If nothing is accepted, the best refused detection is shown if its score is at least this. */
@@ -47,7 +47,7 @@ function line(key, parent, d) {
   element(`${key}/line`, "path", { class: "line", d }, parent);
 }
 
-/** A handle for mouse, finger and keyboard. Its role is in its data. */
+/** A handle for mouse, finger and keyboard; `data` states what the handle moves. */
 function handle(key, parent, data, label, classes = "") {
   const attributes = { class: `handle ${classes}`, tabindex: 0, role: "button", "aria-label": label };
   for (const [name, value] of Object.entries(data)) attributes[`data-${name}`] = value;
@@ -250,7 +250,7 @@ export function renderOverlay() {
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();
   drawn = next;
-  // The selection is on top, so that nothing covers it. It has the focus: the others are moved below it.
+  // The selection is on top, so that nothing covers it. It has the focus: the other groups are moved below it.
   const order = ["grasp", "outline", "box"].filter((key) => key !== state.selected);
   const groups = [...order, state.selected, "draft"].map((key) => drawn.get(key)).filter(Boolean);
   for (let i = groups.length - 2; i >= 0; i -= 1) {

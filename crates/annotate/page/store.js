@@ -5,7 +5,7 @@ export const state = {
   /** Whether the user gave that name; otherwise it is a proposal. */
   isNamed: true,
   modelPath: "",
-  /** The project's folder, or the file of a photo's; its folder's other pictures; versions of the model, oldest first. */
+  /** The project's folder, or the file of a photo's project; other pictures of the folder; versions of the model, oldest first. */
   project: undefined,
   others: [],
   models: [],
@@ -14,7 +14,7 @@ export const state = {
   /** Photos of the part: the server's view of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,
-  /** Pictures to try, each with its `detections` once searched, and those of the model before. */
+  /** Pictures to try, each with its `detections` once searched, and in `before` those of the previous model. */
   trialPictures: [],
   trial: 0,
   tab: "mark",
@@ -70,14 +70,14 @@ export const isAnyMarked = () => state.images.some(isComplete);
 export const MODEL_LIMIT = 0.5;
 /** Whether a detection reaches the chosen minimum score. */
 export const isFound = (detection) => detection.score >= state.minScore;
-/** Whether it also reaches the model's limit. */
+/** Whether a detection reaches both the minimum score and the model's limit. */
 export const isAccepted = (detection) => isFound(detection) && detection.score >= MODEL_LIMIT;
-/** The accepted detections of a picture whose parts are touched by the jaws of one of them. */
+/** The accepted detections whose parts are touched by the jaws of `detection`. */
 export const touchedBy = (detection, detections) => detection.touches.map((i) => detections[i]).filter((other) => other && isAccepted(other));
 /** Whether a model is being taught. */
 export const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
 
-/** Discards all detections, so that the pictures are searched again; `before` keeps them, to compare another model's. */
+/** Discards all detections, so that the pictures are searched again; if `compares`, `before` keeps them for a comparison with another model. */
 export function searchAgain({ compares }) {
   for (const target of [...state.trialPictures, state.live]) {
     Object.assign(target, { before: compares ? target.detections : null, detections: null, failed: null });

@@ -83,7 +83,7 @@ function onStage() {
 /** The size of the picture to try on the stage; empty if something else is shown. */
 let triedSize = "";
 
-/** Shows the content of the current step. From one picture to try to another of its size, the view is kept. */
+/** Shows the content of the current step. Between two pictures to try of the same size, the view is kept. */
 export function showCurrent() {
   const shown = onStage();
   photo.hidden = !shown;

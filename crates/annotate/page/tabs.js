@@ -11,7 +11,7 @@ export function openTab(name) {
   if (state.tab === name) return;
   const before = [state.tab === "try", isLive()];
   Object.assign(state, { tab: name, draft: null });
-  // Another picture is shown only then: otherwise the view is kept.
+  // Shown again only if the stage gets another picture, so that the view is otherwise kept.
   if (String(before) !== String([name === "try", isLive()])) showCurrent();
   changed();
   document.querySelector(".panel").scrollTop = 0;

@@ -22,7 +22,7 @@ import { byName } from "./words.js";
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
-/** Up to this number of pictures the order does not matter. */
+/** With fewer pictures the order does not matter. */
 const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
 const currentModel = () => state.models.find((model) => model.is_current);
@@ -168,7 +168,7 @@ function teachButton() {
   }, isRunning() ? "" : "primary");
 }
 
-/** States that the part is not in this picture, or revokes that. */
+/** States that the part is not in this picture, or revokes the statement. */
 async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));

@@ -10,14 +10,14 @@ import { percent } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const list = by("version-list");
-/** A model that finds fewer by this share of the samples is worse. */
+/** A model whose found share is lower by this or more is worse. */
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
 /** Selected for comparison. */
 let chosen = [];
 
-/** The same without intervals and errors, for a list of models. */
+/** The results without intervals and errors, for a list of models. */
 function briefFigures({ figures }) {
   if (!figures) return "";
   const { found, wrong, false_alarms: alarms } = figures;

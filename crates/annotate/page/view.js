@@ -55,7 +55,7 @@ export function fit() {
   changed();
 }
 
-/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is not reduced, except from `least` as far as the box would not be visible. */
+/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is at least `least`, as far as the box then fits. */
 export function showBox(box, least = state.view.scale) {
   const [x1, y1, x2, y2] = box;
   const { clientWidth, clientHeight } = stage;
@@ -63,7 +63,7 @@ export function showBox(box, least = state.view.scale) {
   const [wide, narrow, whole] = [scaleFor(0.5), scaleFor(0.8), wholeScale()];
   const scale = clamp(Math.max(wide < 1.25 * whole ? narrow : wide, Math.min(least, narrow)), MIN_SCALE, MAX_SCALE);
   if (scale <= whole) return fit();
-  // In the middle, as far as no more than a margin beside the photo comes into view.
+  // The box is in the middle of the view, unless more than a margin beside the photo would then be visible.
   const offset = (side, extent, middle) => {
     const hidden = side - extent * scale;
     return hidden > 0 ? hidden / 2 : clamp(side / 2 - middle * scale, hidden - MARGIN_PX, MARGIN_PX);

@@ -13,12 +13,12 @@ use sdg_camera::{Address, Camera, CameraError, Fault, Playback};
 use crate::live::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 
 /// Default interval between pictures from files without a frame rate in their address. Without an interval, a folder's
-/// pictures would be over before anyone has seen them, or would use a whole core.
+/// pictures would end before anyone has seen them, or reading them would use a whole core.
 const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// Time without a complete frame after which torn frames are a fault: single ones are common with cheap cameras.
 const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
-/// The newest picture of a camera, which a thread reads until the camera ends or fails.
+/// The newest picture of a camera. A thread reads the camera until the camera ends or fails.
 #[derive(Debug)]
 pub struct CameraPictures(Arc<Mutex<Newest>>);
 
@@ -106,7 +106,7 @@ impl Newest {
     }
 }
 
-/// The page's text for a fault; `None` for faults that do not matter there.
+/// The page's text for a fault; `None` for faults that do not matter on the page.
 fn live_fault(fault: &Fault) -> Option<LiveFault> {
     let kind = match fault {
         Fault::Stale { .. } => LiveFaultKind::Stale,

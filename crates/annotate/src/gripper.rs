@@ -51,7 +51,7 @@ impl Gripper {
         (least <= most).then_some(Reach { left: -least, right: most })
     }
 
-    /// The minimum, over angles in steps of 5 degrees, of the opening needed by the same jaws about the same middle;
+    /// The minimum, over angles in steps of 5 degrees, of the opening that these jaws need about their middle;
     /// infinite if the jaws close on nothing at every angle.
     pub fn narrowest(&self, part: &Polygon) -> f64 {
         const NUM_TURNS: u32 = 36;

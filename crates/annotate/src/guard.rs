@@ -1,9 +1,9 @@
 //! Decides which requests are answered: those with the token, this server's host name and no foreign origin.
 //!
 //! Every program on this computer can reach the port, and every web page in the browser can make the browser send
-//! requests to it. So each request must name this server (`Host`: a foreign name that resolves to this address is
-//! rejected), must not come from another page (`Origin`), and must carry the token: in the printed address, in a
-//! cookie, or in the header `Authorization`.
+//! requests to it. So each request must name this server (header `Host`), must not come from another page (`Origin`),
+//! and must carry the token: in the printed address, in a cookie, or in the header `Authorization`. A foreign name that
+//! resolves to this address is rejected.
 
 use crate::error::{Error, Result};
 use crate::http::{Head, Response};

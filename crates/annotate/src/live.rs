@@ -1,7 +1,7 @@
 //! Live pictures from any implementation of [`LivePictures`].
 //!
-//! A frame that was shown on the page is kept for a while, so that the photo taken is the frame that the person saw,
-//! and detections are drawn on the frame in which they were found.
+//! Frames shown on the page are kept for a while: a photo is the frame that the person saw, and detections are drawn on
+//! the frame in which they were found.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -136,7 +136,7 @@ impl LiveDesk {
     /// The picture of a shown frame, for use as a photo.
     ///
     /// # Errors
-    /// As [`frame`](Self::frame), and [`Error::Camera`] while the camera has a fault.
+    /// As [`frame`](Self::frame), and [`Error::Camera`] while the camera has a fault that makes its picture unusable.
     pub(crate) fn photo(&self, number: u64) -> Result<Arc<RgbImage>> {
         match self.options.pictures.newest().fault.filter(|fault| !fault.kind.is_usable()) {
             Some(fault) => Err(Error::Camera { expected: "a camera without a fault", found: fault.text }),

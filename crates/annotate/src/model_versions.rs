@@ -32,7 +32,7 @@ pub struct Version {
     pub summary: TaughtSummary,
     /// Number of photos that it was taught from.
     pub photos: usize,
-    /// Number of pictures without the part that it was taught from.
+    /// Number of pictures without the part in its teaching.
     pub negatives: usize,
     /// [`fingerprint`] of the teaching's inputs.
     pub material: String,

@@ -10,7 +10,7 @@ pub fn file_name(path: &Path) -> String {
 /// Combining accents, as in umlauts on macOS.
 const COMBINING: std::ops::RangeInclusive<char> = '\u{300}'..='\u{36f}';
 
-/// The first 60 characters of a name, with `_` in place of those that not every file system accepts.
+/// The first 60 characters of a name, with `_` in place of all except letters, digits, combining accents, `-` and `_`.
 pub fn safe_stem(name: &str) -> String {
     let safe: String = name
         .chars()
@@ -56,7 +56,8 @@ const ANY_PICTURE: [&str; 14] = [
     "webcam",
 ];
 
-/// The proposed name of the part on a photo: the photo's name, or its folder's if the photo has a generic name.
+/// The proposed name of the part on a photo: the photo's name; if it is generic, the folder's name; if both are,
+/// `part`.
 pub fn proposed_label(photo: Option<&Path>, folder: &Path) -> String {
     let says_something = |name: &String| {
         let letters: String = name.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();

@@ -60,8 +60,8 @@ impl Picture {
         })
     }
 
-    /// Bytes for a browser, and their media type: the file itself, or a JPEG if browsers do not support the format or
-    /// the stored pixels are rotated, so that coordinates are the same in both.
+    /// Bytes for a browser, with upright pixels, and their media type: the file itself if it is an upright PNG or JPEG,
+    /// otherwise a JPEG.
     ///
     /// # Errors
     /// The file has become unreadable.

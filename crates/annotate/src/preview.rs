@@ -39,7 +39,7 @@ impl Previews {
     /// key differs from the last one.
     ///
     /// # Errors
-    /// Those of `demonstration`; the marks are unsuitable for teaching.
+    /// The errors of `demonstration`; the marks are unsuitable for teaching.
     pub fn sample(
         &self,
         key: SampleKey,

@@ -36,7 +36,7 @@ struct RecentFile {
 }
 
 impl RecentProjects {
-    /// The list in this file, which need not exist yet.
+    /// The list in this file; the file need not exist yet.
     pub fn at(path: PathBuf) -> Self {
         Self { path }
     }

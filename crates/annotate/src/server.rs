@@ -70,7 +70,7 @@ impl Server {
         Self::bind_desk(Desk::of_session(session), port, token.as_deref())
     }
 
-    /// The same for a page on which a project is chosen; `token` is an existing token, if any.
+    /// Like [`bind`](Self::bind), for a page on which a project is chosen; `token` is an existing token, if any.
     ///
     /// # Errors
     /// The port is taken, or there are no random bytes for the token.
@@ -123,8 +123,8 @@ impl Server {
                 Ok((stream, _)) => stream,
                 // A connection that broke before it was accepted must not end the server.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
-                // Open connections release descriptors when they close. Without open connections, none may ever be
-                // released.
+                // Open connections release descriptors when they close. If no connection is open, a descriptor may
+                // never become free.
                 Err(error) if is_out_of_descriptors(&error) => {
                     let is_idle = connections.available_permits() == MAX_CONNECTIONS;
                     if is_idle && lack_since.get_or_insert_with(Instant::now).elapsed() > MAX_LACK {
@@ -160,7 +160,7 @@ async fn serve(stream: TcpStream, service: Service, patience: Duration) {
     if stream.set_nodelay(true).is_err() {
         return;
     }
-    // hyper limits the time of a head, `Service::answer` that of a body, and this the time of a response.
+    // hyper limits the time of a head, `Service::answer` that of a body, and the write timeout that of a response.
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(patience));
     let connection = http1::Builder::new()

@@ -44,8 +44,8 @@ pub struct SessionOptions {
     pub model_path: Option<PathBuf>,
     /// A camera for taking pictures; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
-    /// The folder of a project; `images` are then empty. Without it, the first image has its own project. The project
-    /// is opened in its last state.
+    /// The folder of a project; `images` are then empty. Without a folder, the project of the first image is used.
+    /// The project is opened in its last state.
     pub project: Option<PathBuf>,
     /// The page's token, for a server that the same page must find again; `None` for a new one.
     pub token: Option<String>,
@@ -76,8 +76,8 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 
 /// A session of the page.
 ///
-/// It calls teaching and previews, which never call it. While the lock on `state` is held, only the lock on the
-/// teaching's model is taken, never the reverse.
+/// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the
+/// lock on the teaching's model is taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
@@ -289,7 +289,8 @@ impl Session {
     /// Writes a shown frame as PNG, under an unused name, and makes it a photo of the object.
     ///
     /// # Errors
-    /// No camera, or a camera with a fault; the frame is no longer kept; the file cannot be written.
+    /// No camera, or a camera with a fault that makes its picture unusable; the frame is no longer kept; the file
+    /// cannot be written.
     pub fn take_photo(&self, number: u64) -> Result<ImageView> {
         let frame = self.live_desk()?.photo(number)?;
         let bytes = png(&frame)?;

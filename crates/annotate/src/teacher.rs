@@ -87,8 +87,8 @@ pub trait TaughtModel: Send + Sync {
     /// The image cannot be searched.
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError>;
 
-    /// The same, and for the best refused detections the positions at which picture and demonstration differ, which
-    /// takes longer.
+    /// Like [`Self::detect`], and may add to the best refused detections the positions at which picture and
+    /// demonstration differ, which takes longer.
     ///
     /// # Errors
     /// As [`Self::detect`].

@@ -44,7 +44,7 @@ pub struct News {
     pub of: &'static str,
     /// Number of photos of the part that it learns from.
     pub photos: usize,
-    /// Number of pictures without the part that it learns from.
+    /// Number of pictures without the part in this teaching.
     pub negatives: usize,
     /// Steps done.
     pub done: usize,

@@ -22,7 +22,7 @@ pub enum Saved {
     Refused {
         /// One line for the user.
         why: String,
-        /// Whether writing the file failed, so that the same marks may be saved later.
+        /// Whether writing the file failed; the same marks may be saved later.
         by_disk: bool,
     },
 }
@@ -78,7 +78,7 @@ pub struct ModelView {
     pub summary: TaughtSummary,
     /// Number of photos that it was taught from.
     pub photos: usize,
-    /// Number of pictures without the part that it was taught from.
+    /// Number of pictures without the part in its teaching.
     pub negatives: usize,
     /// Whether this version is in use.
     pub is_current: bool,
@@ -106,7 +106,7 @@ pub struct OtherView {
 pub struct VersionFound {
     /// The best score of all detections.
     pub best: f64,
-    /// The marks of the accepted ones without their outlines, the best first.
+    /// The marks of the accepted detections, without outlines, the best first.
     pub accepted: Vec<Marks>,
 }
 
@@ -144,7 +144,7 @@ pub struct SessionView {
     pub models: Vec<ModelView>,
     /// The searched region; `None` for the whole picture.
     pub region: Option<Region>,
-    /// Whether the camera of the photos is calibrated, so that the part's size is known.
+    /// Whether the camera of the photos is calibrated; the part's size is then known.
     pub is_calibrated: bool,
     /// The project: its folder, or the file of a photo's project; `None` until there is a photo.
     pub project: Option<String>,

@@ -155,7 +155,7 @@ fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
     assert_eq!(names(&session(&served)["others"]), ["a.png"]);
     served.ask("DELETE", "/api/trial-pictures/0", b"").json();
     assert_eq!(names(&session(&served)["others"]), ["a.png", "c.png"]);
-    // A photo from another folder is copied beside the others.
+    // A photo from another folder is copied beside the project's photos.
     let uploaded = served.ask("POST", "/api/images?name=../b.png", &photo_png()).json();
     assert_eq!(uploaded["name"], "b-2.png");
     assert_eq!(served.ask("POST", "/api/images?name=no.png", b"no picture").status, 422);
@@ -217,6 +217,6 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
         (&again["label"], again["images"][0]["marks"]["box"].clone()),
         (&json!("wing bolt"), json!([40.0, 40.0, 140.0, 60.0]))
     );
-    // A page opened for one project offers no others.
+    // A page opened for one project offers no other projects.
     assert_eq!(Served::start().ask("DELETE", "/api/projects", b"").status, 409);
 }

@@ -30,7 +30,7 @@ fn a_picture_is_learnt_from_on_trial_and_nothing_is_kept() {
         ask("POST", &format!("/api/trial-pictures/{id}/would-help"), &body)
     };
     let before = ask("GET", "/api/session", "").json();
-    // The trial model of this teacher finds the last demonstration: that picture again, and not the photo.
+    // This teacher's trial model finds only the last demonstration, here picture 0, to which picture 1 is equal.
     assert_eq!(question("S", 0).json(), json!([[1, 0.9], [2, 0.1]]));
     assert_eq!(ask("GET", "/api/session", "").json(), before);
     let refused = question("C", 0);

@@ -49,7 +49,7 @@ fn silent_connections_are_closed() {
         (String::new(), vec![]),
         (head.clone(), vec![]),
         (format!("{head}Content-Length: 3\r\n\r\n{{"), vec![]),
-        // Also after a response, when another request might follow.
+        // A connection is also closed after a response, when another request might follow.
         (whole, vec![404]),
     ] {
         let start = Instant::now();
@@ -83,7 +83,7 @@ fn nothing_is_kept_open_after_a_refusal_and_after_http_1_0() {
         (format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", served.host()), 401),
         (format!("GET /nowhere HTTP/1.0\r\nHost: {}\r\nCookie: {}\r\n\r\n", served.host(), served.cookie()), 404),
     ] {
-        // Ends before the server's timeout, or fails.
+        // The exchange ends before the server's timeout, or fails.
         let answer = served.exchange(request.as_bytes(), Then::StaySilent).replace("HTTP/1.0", "HTTP/1.1");
         assert_eq!(statuses(&answer), [status]);
     }
@@ -113,7 +113,7 @@ fn child_with_few_descriptors() {
     assert_eq!(served.ask("GET", "/api/session", b"").status, 200);
 }
 
-/// As above, but no descriptor will ever be released, because no connection is open.
+/// Like [`child_with_few_descriptors`], but no descriptor is ever released, because no connection is open.
 #[cfg(unix)]
 #[test]
 #[ignore = "needs few descriptors; another test runs it in a child process"]

@@ -78,7 +78,8 @@ pub struct Record {
     /// The part's size relative to its nominal size; absent with a camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
-    /// Indices, in the list of all detections, of accepted parts that the jaws of this accepted one would touch.
+    /// Indices, in the list of all detections, of accepted parts that the jaws of this detection would touch; empty if
+    /// this detection is refused.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jaws_touch: Vec<usize>,
 }

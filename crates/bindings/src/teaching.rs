@@ -33,8 +33,8 @@ pub struct Teaching {
     pub camera: Option<CameraTeaching>,
 }
 
-/// Teaches like `sdg teach`; `observe` may end teaching early. The model is the one that a file contains, with
-/// rounded weights.
+/// Teaches like `sdg teach`; `observe` may end teaching early. The returned model is read back from its file's bytes,
+/// so its weights are rounded.
 ///
 /// # Errors
 /// Files cannot be read, photos or marks are unsuitable for teaching, or teaching was ended before there was a model.

@@ -36,7 +36,7 @@ pub fn status(work: impl FnOnce() -> Result<()>) -> sdg_status {
 /// The conditions of [`copy_text`].
 pub unsafe fn copy_last_error(buffer: *mut c_char, num_bytes: usize) -> usize {
     let text = LAST_ERROR.try_with(|last| last.borrow().clone()).unwrap_or_default();
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     unsafe { copy_text(&text, buffer, num_bytes) }
 }
 

@@ -103,7 +103,7 @@ pub unsafe fn teaching(from: &sdg_teaching) -> Result<(Teaching, TeachOptions)> 
             return Err(Fault::new(FaultKind::Argument, text));
         }
     };
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     let file = |pointer, name: &str| unsafe { path(pointer, name) }.map(PathBuf::from);
     let camera = if from.camera.is_null() {
         if from.mark_height_m != 0.0 || from.grasp_height_m != 0.0 {

@@ -31,7 +31,7 @@ pub extern "C" fn sdg_check_abi(abi_version: u32) -> sdg_status {
 /// `buffer` is null or writable for `num_bytes`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_last_error(buffer: *mut c_char, num_bytes: usize) -> usize {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     unsafe { copy_last_error(buffer, num_bytes) }
 }
 
@@ -41,7 +41,7 @@ pub unsafe extern "C" fn sdg_last_error(buffer: *mut c_char, num_bytes: usize) -
 /// `file` is null or zero-terminated; `model` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_model_load(file: *const c_char, model: *mut sdg_handle) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { give(model, "model", || Ok(Object::Model(Arc::new(Model::read(path(file, "file")?)?)))) })
 }
 
@@ -51,7 +51,7 @@ pub unsafe extern "C" fn sdg_model_load(file: *const c_char, model: *mut sdg_han
 /// `file` is null or zero-terminated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_model_save(model: sdg_handle, file: *const c_char) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| handles::model(model)?.write(unsafe { path(file, "file")? }))
 }
 
@@ -62,12 +62,12 @@ pub unsafe extern "C" fn sdg_model_save(model: sdg_handle, file: *const c_char) 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_handle) -> sdg_status {
     let taught = || {
-        // SAFETY: the caller promises the same.
+        // SAFETY: the caller meets the conditions of `# Safety`.
         let (from, options) = unsafe { teaching(from.as_ref().ok_or_else(|| null("from"))?)? };
         let model = sdg_bindings::teach(&from, options, &mut |_| ControlFlow::Continue(()))?;
         Ok(Object::Model(Arc::new(model)))
     };
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { give(model, "model", taught) })
 }
 
@@ -78,7 +78,7 @@ pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_ha
 /// `file` is null or zero-terminated; `camera` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_camera_load(file: *const c_char, camera: *mut sdg_handle) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { give(camera, "camera", || Ok(Object::Camera(Camera::read(path(file, "file")?)?))) })
 }
 
@@ -97,13 +97,13 @@ pub unsafe extern "C" fn sdg_detect(
 ) -> sdg_status {
     let detected = || {
         let model = handles::model(model)?;
-        // SAFETY: the caller promises the same.
+        // SAFETY: the caller meets the conditions of `# Safety`.
         let view = view(unsafe { options.as_ref() })?;
-        // SAFETY: the caller promises the same.
+        // SAFETY: the caller meets the conditions of `# Safety`.
         let pixels = unsafe { self::picture(picture.as_ref().ok_or_else(|| null("picture"))?)? };
         Ok(Object::Detections(Arc::new(model.detect(&pixels, &view)?)))
     };
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { give(detections, "detections", detected) })
 }
 
@@ -113,7 +113,7 @@ pub unsafe extern "C" fn sdg_detect(
 /// `count` is null or writable for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_count(detections: sdg_handle, count: *mut usize) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { write(count, "count", handles::detections(detections)?.len()) })
 }
 
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn sdg_detections_get(
     idx: usize,
     found: *mut sdg_detection,
 ) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| with_record(detections, idx, |record| unsafe { write(found, "found", detection(record)) }))
 }
 
@@ -137,7 +137,7 @@ pub unsafe extern "C" fn sdg_detections_get(
 /// `found` is null or writable for a detection.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_detections_best(detections: sdg_handle, found: *mut sdg_detection) -> sdg_status {
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { write(found, "found", detection(handles::detections(detections)?.best()?)) })
 }
 
@@ -155,7 +155,7 @@ pub unsafe extern "C" fn sdg_detections_polygon(
     status(|| {
         with_record(detections, idx, |record| {
             let polygon = record.found.detection.polygon.as_deref().unwrap_or_default();
-            // SAFETY: the caller promises the same.
+            // SAFETY: the caller meets the conditions of `# Safety`.
             unsafe { copy_rows(polygon, numbers, max_points) }
         })
     })
@@ -174,7 +174,7 @@ pub unsafe extern "C" fn sdg_detections_keypoints(
     max_points: usize,
 ) -> sdg_status {
     status(|| {
-        // SAFETY: the caller promises the same.
+        // SAFETY: the caller meets the conditions of `# Safety`.
         with_record(detections, idx, |record| unsafe {
             copy_rows(&record.found.detection.keypoints, numbers, max_points)
         })
@@ -195,7 +195,7 @@ pub unsafe extern "C" fn sdg_detections_json(
 ) -> sdg_status {
     status(|| {
         let json = handles::detections(detections)?.to_json();
-        // SAFETY: the caller promises the same.
+        // SAFETY: the caller meets the conditions of `# Safety`.
         let all = unsafe { copy_text(&json, buffer, num_bytes) };
         if !needed.is_null() {
             // SAFETY: not null, and the caller promises the rest.
@@ -222,7 +222,7 @@ unsafe fn give(out: *mut sdg_handle, name: &str, make: impl FnOnce() -> Result<O
         return Err(null(name));
     }
     let handle = make()?.keep();
-    // SAFETY: the caller promises the same.
+    // SAFETY: the caller meets the conditions of `# Safety`.
     unsafe { write(out, name, handle) }
 }
 

@@ -7,7 +7,7 @@ use sdg_bindings::{Camera, Detections, Fault, FaultKind, Model, Result};
 
 use crate::types::sdg_handle;
 
-/// The object of a handle. If another thread frees it during a call, the call still holds it.
+/// The object of a handle. If another thread frees the handle during a call, the call still holds the object.
 #[derive(Debug, Clone)]
 pub enum Object {
     Model(Arc<Model>),

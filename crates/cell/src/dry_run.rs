@@ -21,7 +21,7 @@ pub struct DryRun {
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of the arm. `target` is the part's pose, if the part is visible from there.
+    /// Plans the sequence from a state of the arm. `target` is the part's pose, if the part is visible in this state.
     ///
     /// # Errors
     /// A setting of the sequence is invalid, or the place has no room for the part. A motion that violates a limit is

@@ -120,13 +120,13 @@ const SIZE_LEEWAY: f64 = 0.03;
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
 /// In a picture for measuring a height: maximum horizontal distance of the part from its expected position, in metres.
 const SAME_PART_M: f64 = 0.040;
-/// Maximum relative difference between the demonstrations' sizes. Above it, no height is derived from the size.
+/// Maximum relative difference between the demonstrations' sizes for deriving a part's height from its size.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 /// Margin added to the height of the part's top, in metres.
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface is searched within this number of standard deviations of the expected height.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Minimum and maximum of that search distance, in metres.
+/// Minimum and maximum distance from the expected height at which the surface is searched, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
@@ -171,8 +171,8 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
-    /// Finds the part for a plan, from one picture, which does not measure the part's height. Searches at the given or
-    /// taught height first; if no detection there is sure, takes a second picture and searches at all possible heights.
+    /// Finds the part for a plan, without measuring the part's height. Searches at the given or taught height first; if
+    /// no detection there is sure, takes a second picture and searches at all possible heights.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -277,7 +277,7 @@ impl<P> ModelFinder<P> {
     }
 
     /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the demonstrations' sizes
-    /// differ, or if the picture was not compared with them.
+    /// differ, or if the picture was not compared with a demonstration.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();

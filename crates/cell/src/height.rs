@@ -1,4 +1,4 @@
-//! Where the height of parts comes from: measured by a camera on the hand, or given.
+//! The height of parts: measured by a camera on the hand, or given.
 
 use sdg_grasp::GraspModel;
 use sdg_robot::CameraPose;

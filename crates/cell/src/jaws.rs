@@ -61,8 +61,8 @@ fn region(detection: &GraspDetection) -> Polygon {
 }
 
 impl Perception {
-    /// As [`Self::touched_by_jaws`] for the detections with at least `min_score`; the others touch nothing and are not
-    /// touched.
+    /// As [`Self::touched_by_jaws`] for the detections with at least `min_score`; the other detections touch nothing
+    /// and are not touched.
     pub fn touched_among_accepted(&self, detections: &[&GraspDetection], min_score: f64) -> Vec<Vec<usize>> {
         let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| detections[idx].score >= min_score).collect();
         let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();

@@ -98,7 +98,7 @@ pub struct FrameDetector {
     first: Option<SystemTime>,
 }
 
-/// Interval for stored pictures without a frame rate, which may be unrelated.
+/// Interval for stored pictures without a frame rate: such pictures may be unrelated.
 const UNRELATED: Duration = Duration::from_secs(1);
 
 impl FrameDetector {

@@ -4,8 +4,8 @@ use nalgebra::Point2;
 use sdg_grasp::GraspModel;
 use sdg_robot::PartShape;
 
-/// The part's shape, if the model knows lengths and its first demonstration has an outline; otherwise `None`, and the
-/// camera measures the width between the fingers.
+/// The part's shape, if the model knows lengths and its first demonstration has an outline; otherwise `None`: the
+/// sequence then assumes a shape from the part's width between the fingers.
 pub fn part_shape(model: &GraspModel) -> Option<PartShape> {
     let lengths = model.facts().lengths?;
     let marks = &model.demonstrations().first()?.marks;

@@ -16,7 +16,7 @@ use crate::error::Result;
 
 /// Detects grasps in pictures: in pixels, and also in metres if the camera and its pose are known.
 ///
-/// Used by all callers: the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
+/// Used by the command line, the page, the ROS 2 node, an arm's sequence, rehearsals and evaluations.
 #[derive(Debug, Clone)]
 pub struct Perception {
     view: View,

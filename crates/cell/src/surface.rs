@@ -26,7 +26,7 @@ const WINDOW_DISTANCE_M: [f64; 2] = [0.002, 0.040];
 const STEP_M: f64 = 0.0005;
 /// Minimum correlation of both pictures at a window's height.
 const MIN_CORRELATION: f64 = 0.8;
-/// Minimum decrease of the correlation at heights that differ from that height by more than [`LEAD_BEYOND_M`].
+/// Minimum decrease of the correlation at heights that differ from the window's height by more than [`LEAD_BEYOND_M`].
 const MIN_LEAD: f64 = 0.15;
 const LEAD_BEYOND_M: f64 = 0.003;
 /// Maximum number of windows that determine the surface; the nearest ones are used.

@@ -1,4 +1,4 @@
-//! The commands of the command line. Each command's arguments and help are in its file in `commands/`.
+//! The commands of the command line. The arguments and help of most commands are in their own files in `commands/`.
 
 use clap::{Parser, Subcommand};
 

@@ -1,4 +1,4 @@
-//! The end of every help text and manual page: two examples and the exit codes.
+//! The end of the help texts and manual pages: two examples of the command and the exit codes.
 
 use clap::Command;
 
@@ -6,7 +6,7 @@ use clap::Command;
 const EXIT_CODES: &str =
     "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 found nothing, 4 poor model (docs/command-line.md)";
 
-/// Two example calls of each command.
+/// Two example calls of each command without subcommands.
 const EXAMPLES: &[[&str; 2]] = &[
     ["sdg demo", "sdg demo --object rod_end --attempts 20 --seed 2"],
     ["sdg annotate photo.png", "sdg annotate --from v4l: --size 1280x720"],
@@ -83,7 +83,8 @@ const EXAMPLES: &[[&str; 2]] = &[
     ["sdg devices", "sdg devices --json"],
 ];
 
-/// Adds examples and exit codes to the end of the help of the command and of all its subcommands.
+/// Adds the exit codes, and the examples that exist, to the end of the help of the command and of all its
+/// subcommands.
 pub fn with_examples(command: Command) -> Command {
     with_ending(command, "")
 }

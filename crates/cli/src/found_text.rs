@@ -28,7 +28,7 @@ pub fn advice_in_words(advice: Advice) -> &'static str {
 /// Inputs of the texts about the detections in a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Wording<'a> {
-    /// The perception that found them.
+    /// The perception that found the detections.
     pub detector: &'a Perception,
     /// Width and height of the picture.
     pub picture_size: [u32; 2],

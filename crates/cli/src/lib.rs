@@ -122,7 +122,7 @@ pub fn run(args: &Args) -> u8 {
     }
 }
 
-/// Whether the total time is printed at the end: for verbs that take long and do not report it themselves.
+/// Whether the total time is printed at the end: for commands that take long and do not report it themselves.
 fn prints_total_time(command: &Command) -> bool {
     match command {
         Command::Demo(_) | Command::Rehearse(_) | Command::Augment(_) => true,

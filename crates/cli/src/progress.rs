@@ -8,7 +8,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use sdg_evaluation::Progress;
 
-/// Shows progress. All workers use the same instance.
+/// Shows progress. All workers share one instance.
 pub struct EvaluationProgress {
     bar: Option<ProgressBar>,
     started: Instant,

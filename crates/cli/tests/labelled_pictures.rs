@@ -179,7 +179,7 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     assert_eq!(at(0.5)["false_alarms"], evaluated["false_alarms"]);
     assert!(at(0.0)["found"].as_u64() >= at(0.5)["found"].as_u64());
 
-    // The same marks in the other format, with the photo from which the model was taught and another program's JSON in
+    // The samples' marks as LabelMe, with the photo from which the model was taught and another program's JSON in
     // the folder.
     let labelme = folder.path().join("labelme");
     write_labelme(&samples, &labelme);
@@ -204,7 +204,7 @@ struct Case {
 impl Case {
     fn new(name: &str, labels: &str) -> Self {
         let case = Self { folder: tempfile::tempdir().unwrap() };
-        // The shipped photo with one changed row of pixels, so that the model was not taught from this picture.
+        // The shipped photo with one changed row of pixels, so the model was not taught from this picture.
         let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
         let [width, height] = [picture.width(), picture.height()];
         for x in 0..width {

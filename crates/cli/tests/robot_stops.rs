@@ -32,7 +32,7 @@ const MOVING: [Duration; 5] = [
     Duration::from_secs(8),
 ];
 
-/// Tries these times until the motion was in progress.
+/// Tries the times of [`MOVING`] until the motion was in progress.
 fn once_moving<T>(attempt: impl FnMut(Duration) -> Option<T>) -> T {
     MOVING.into_iter().find_map(attempt).expect("the arm moves within 8 s")
 }

@@ -192,7 +192,7 @@ fn damaged_results_are_refused(shared: &str) {
     let at = |name: &str| Path::new(shared).join(name);
     let is_refused = |parts: &[&str]| refused(&evaluate(shared, &["--collect"]), 1, parts);
 
-    // With other settings; the teaching does not depend on the number of pictures.
+    // Results with another number of pictures, on which the teaching does not depend.
     let with_two_views = |more: &[&str]| {
         let mut arguments = arguments(shared, more);
         let views = arguments.iter().position(|argument| *argument == "--views").unwrap();

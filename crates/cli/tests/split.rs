@@ -61,7 +61,7 @@ fn write_set(folder: &Folder, name: &str) -> String {
     set
 }
 
-/// A split with that set and with a second set on the reported side, whose folder does not exist.
+/// A split with the set of [`write_set`] and with a second set on the reported side, whose folder does not exist.
 fn write_split(folder: &Folder) -> String {
     let set = |name: &str, side: &str| {
         format!("[[set]]\nname = \"{name}\"\nside = \"{side}\"\nfolder = \"{name}\"\ndemo = \"demo.png\"\n")

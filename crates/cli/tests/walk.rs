@@ -30,7 +30,7 @@ struct StopWatch {
     page: Page,
     set: String,
     actions: usize,
-    /// The letters of lines shown so far.
+    /// Lines shown so far, reduced to their letters.
     lines: BTreeSet<String>,
     words: usize,
     waited: f64,

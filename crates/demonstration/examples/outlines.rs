@@ -1,6 +1,6 @@
-//! Compares proposed outlines with drawn ones, without clicks and after one and two clicks of a simulated person:
-//! overlap, fraction of the true outline within 3 px (or 1 % of the part's diagonal if that is more), time; medians at
-//! the end.
+//! Compares proposed outlines with drawn ones, without clicks and after one and two clicks of a simulated person.
+//! Prints the overlap, the fraction of the true outline within 3 px (or 1 % of the part's diagonal if that is more),
+//! the time, and at the end the medians.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example outlines -- PICTURE[:ANNOTATION] …

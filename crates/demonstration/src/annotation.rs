@@ -9,7 +9,7 @@ use crate::{Error, Result};
 pub struct Annotation {
     /// The object's name.
     pub label: String,
-    /// The box around it: as drawn, or around the outline if none was drawn.
+    /// The box around the object: as drawn, or the outline's bounding box if no box was drawn.
     pub bbox: BoundingBox,
     /// The two points of the grasp, if marked.
     pub grasp: Option<GraspLine>,

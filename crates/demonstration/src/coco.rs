@@ -1,7 +1,9 @@
-//! COCO JSON, the canonical annotation: `bbox` xywh, `keypoints` x y v named `grasp_start` and `grasp_end`,
-//! `segmentation` polygons; under `attributes`, where CVAT stores values without a COCO field, `jaw_width` in pixels,
-//! `grasp_offset`, the grasp's centre relative to the box's, and `optional`. Coordinates are this project's: the centre
-//! of the first pixel is (0.5, 0.5).
+//! COCO JSON, the canonical annotation. Coordinates are this project's: the centre of the first pixel is (0.5, 0.5).
+//!
+//! - `bbox`: xywh. `segmentation`: polygons.
+//! - `keypoints`: x y v, named `grasp_start` and `grasp_end`.
+//! - `attributes`, where CVAT stores values without a COCO field: `jaw_width`, in pixels; `grasp_offset`, the grasp's
+//!   centre relative to the box's; `optional`.
 
 use nalgebra::Point2;
 use serde_json::{Value, json};
@@ -69,7 +71,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
 /// The category of an annotation, if the file has it.
 ///
 /// # Errors
-/// Two categories of one id with different keypoint names, so that the grasp's start is unknown.
+/// Two categories of one id with different keypoint names: the grasp's start is unknown.
 fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<Option<&'b Node<'a>>> {
     let Some(id) = annotation.optional("category_id")? else { return Ok(None) };
     let mut of_id =

@@ -66,7 +66,7 @@ pub(crate) fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Resul
     })
 }
 
-/// Whether two ids are the same number, which some programs write as 1.0 or as text, or the same text.
+/// Whether two ids are equal as text or as numbers: some programs write a number as 1.0 or as text.
 pub(crate) fn is_same_id(one: &Value, other: &Value) -> bool {
     let number = |id: &Value| id.as_f64().or_else(|| id.as_str()?.trim().parse().ok());
     one == other || number(one).is_some_and(|one| Some(one) == number(other))

@@ -54,7 +54,7 @@ impl Demonstration {
             .collect())
     }
 
-    /// The same with these regions of the photo (pixels) removed, except for the part itself.
+    /// This demonstration with these regions of the photo (pixels) removed, except for the part itself.
     #[must_use]
     pub fn without(self, others: &[Polygon]) -> Self {
         if others.is_empty() {

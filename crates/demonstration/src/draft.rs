@@ -168,7 +168,7 @@ fn check_jaw_width(width: f64, place: String, image: &ImageFacts) -> Result<f64>
 
 fn check_outline(points: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result<Polygon> {
     let mut vertices = points.iter().map(|&point| inside(point, place, image)).collect::<Result<Vec<_>>>()?;
-    // Tools repeat the first vertex at the end, and double clicks repeat others.
+    // Tools repeat the first vertex at the end, and double clicks repeat other vertices.
     vertices.dedup();
     if vertices.len() > 1 && vertices.first() == vertices.last() {
         vertices.pop();

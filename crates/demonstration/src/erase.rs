@@ -125,7 +125,7 @@ fn pull_push(picture: &Raster, hole: &[bool]) -> Raster {
             for x in 0..fine.width {
                 let pixel = &mut fine.pixels[y * fine.width + x];
                 if pixel[3] < 1.0 {
-                    // Without any known pixel: a medium grey.
+                    // If no pixel is known, the hole becomes medium grey.
                     let below = match &coarse {
                         Some(coarse) => coarse.bilinear((x as f32 + 0.5) / 2.0, (y as f32 + 0.5) / 2.0),
                         None if pixel[3] > 0.0 => pixel.map(|v| v / pixel[3]),

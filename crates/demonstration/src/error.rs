@@ -1,4 +1,4 @@
-//! Errors of a photo or its annotation, each with the expected and the found value.
+//! Errors of a photo or its annotation, most with the expected and the found value.
 
 use sdg_picture::PictureError;
 use thiserror::Error;
@@ -103,7 +103,7 @@ pub enum Error {
     Lacking {
         label: String,
         missing: &'static str,
-        /// The reason why it is needed, and how to add it.
+        /// Why the missing marks are needed, and how to add them.
         why: String,
     },
     /// Marks of one part that contradict each other.

@@ -6,9 +6,9 @@
 pub(crate) enum NameLikeness {
     /// The last part of the path is the same.
     Same,
-    /// The same with escapes of web addresses resolved, accents composed, and in lower case.
+    /// The last part is the same if escapes of web addresses are resolved, accents composed, and letters in lower case.
     Folded,
-    /// The same except the extension: the picture was converted.
+    /// The last part is the same except for the extension: the picture was converted.
     Stem,
 }
 

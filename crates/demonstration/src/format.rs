@@ -23,7 +23,7 @@ pub enum AnnotationFormat {
 /// The size of an image according to an annotation file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeclaredImage {
-    /// The image's file name, as written there.
+    /// The image's file name, as written in the annotation file.
     pub file_name: Option<String>,
     /// Width, in pixels.
     pub width: u32,
@@ -48,7 +48,7 @@ impl AnnotationFormat {
     /// Recognises the format by the content.
     ///
     /// # Errors
-    /// Content of none of them.
+    /// Content of no known format.
     pub fn of(bytes: &[u8]) -> Result<Self> {
         if npy::is_npy(bytes) {
             return Ok(Self::OpenDr);
@@ -99,7 +99,7 @@ impl AnnotationFormat {
         Some((field, without_escapes(name?.as_str()?)))
     }
 
-    /// Writes the marks of one image. Reading it back gives the same, except for the contents of `left_out`.
+    /// Writes the marks of one image. Reading the text back gives the same marks, except for those in `left_out`.
     ///
     /// # Errors
     /// [`Error::ReadOnlyFormat`] for OpenDR's.
@@ -138,9 +138,9 @@ impl Annotation {
     /// Reads every object that a file marks on the image; the content determines the [`AnnotationFormat`].
     ///
     /// # Errors
-    /// An invalid file, one made on an image of another size, and every invalid [`Annotation`]: outside the image by
-    /// more than a pixel, without extent, not finite, half a grasp line, an outline of fewer than three points or one
-    /// that crosses itself. Several objects need group ids (LabelMe). The message gives the position.
+    /// An invalid file; a file for an image of another size; several LabelMe objects without group ids. Marks that are
+    /// outside the image by more than a pixel, without extent or not finite; half a grasp line; an outline of fewer
+    /// than three points, or one that crosses itself. The message gives the position.
     pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
         Self::read_with(bytes, None, image)
     }
@@ -149,7 +149,7 @@ impl Annotation {
     /// or the other one of OpenDR's two files.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read), and a second file that does not match.
+    /// The errors of [`read`](Self::read); or the second file does not match.
     pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
         AnnotationFormat::of(bytes)?.read(bytes, beside, image)
     }

@@ -16,7 +16,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
     // Windows editors often start with a byte order mark, which the parser does not accept.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let parsed = serde_json::from_slice(bytes);
-    // Areas are not used, so that invalid ones are replaced.
+    // The values of `area` are not used, so invalid ones are replaced instead of refused.
     let parsed = parsed.or_else(|error| match without_area_literals(bytes) {
         Some(patched) => serde_json::from_slice(&patched),
         None => Err(error),

@@ -11,8 +11,8 @@ const MAX_STRAY_SHARE: f64 = 0.02;
 /// … and in pixels; the larger value applies.
 const MAX_STRAY_PX: f64 = 1.5;
 
-/// Puts the first and the last keypoint into the draft as the grasp's ends; those between them must lie evenly on the
-/// line, like OpenDR's ten, because other keypoints mark something else. `None` is an unlabelled keypoint.
+/// Puts the first and the last keypoint into the draft as the grasp's ends. The keypoints between them must lie evenly
+/// on the line, like OpenDR's; otherwise the keypoints mark something else. `None` is an unlabelled keypoint.
 pub(crate) fn read_grasp(keypoints: &[Option<Point2<f64>>], place: &str, draft: &mut Draft) -> Result<()> {
     let (first, last) = match keypoints {
         [] => return Ok(()),

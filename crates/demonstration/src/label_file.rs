@@ -1,7 +1,7 @@
 //! Label files of test pictures: any number of instances per picture, including none.
 //!
 //! A demonstration marks one part and must have a grasp; a test picture may mark many parts, or none, which means that
-//! the part is absent. Boxes, points and outlines are read by the same code.
+//! the part is absent. Boxes, points and outlines are read by the code for demonstrations.
 
 use serde_json::Value;
 
@@ -76,8 +76,8 @@ impl LabelFile {
     /// The marks of one picture, in the file's order; empty if the part is absent.
     ///
     /// # Errors
-    /// Those of [`Annotation::read`], except [`Error::NoObject`] for a picture without marks, and except boxes and
-    /// outlines across the picture's border. A grasp must lie inside.
+    /// The errors of [`Annotation::read`], except [`Error::NoObject`] for a picture without marks, and except the
+    /// errors of boxes and outlines across the picture's border. A grasp must lie inside.
     pub fn instances(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let root = Node::root(&self.value);
         match self.format {

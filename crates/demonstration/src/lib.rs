@@ -7,7 +7,7 @@
 //! YOLO-pose, OpenDR ─ Annotation ──┘                           CocoFile ── bytes ────┘
 //! ```
 //!
-//! Everything from outside is checked here, once: [`decode_image`] reads the size before it allocates memory,
+//! Everything from outside is checked here, once: [`decode_image`] reads the size before it allocates memory, and
 //! errors of [`Annotation::read`] give the expected value, the found value and the position. [`Augmenter`] then
 //! makes any number of samples by random access: sample *i* of a seed is the same on every call.
 //!

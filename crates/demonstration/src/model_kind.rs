@@ -63,7 +63,7 @@ impl ModelKind {
         self != Self::S
     }
 
-    /// The model whose network this one uses: B and C are taught alike and read differently, so that C's file serves
+    /// The model whose network this one uses: B and C are taught alike and read differently, so C's file serves
     /// both.
     pub fn taught_as(self) -> Self {
         match self {

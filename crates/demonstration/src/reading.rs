@@ -11,12 +11,12 @@ use sdg_geometry::{BoundingBox, Polygon};
 
 use crate::Annotation;
 
-/// Factor by which another reading must fit better than the marks as they are. Of 62 labelled photos, the shipped
-/// demonstrations among them, with outlines and with boxes alone, none is refused at 1.1; at 3, of intentionally wrong
-/// marks, 56 of 57 outlines and 126 of 144 boxes are refused.
+/// Factor by which another reading must fit better than the marks as they are. At 1.1, none of 62 labelled photos (with
+/// the shipped demonstrations) is refused, neither with outlines nor with boxes alone. At 3, 56 of 57 intentionally
+/// wrong outlines and 126 of 144 wrong boxes are refused.
 const MIN_GAIN: f64 = 3.0;
 /// Minimum colour difference of marks around a part. It is smaller where one mixture of colours is inside and outside,
-/// such as on a plain background. The smallest difference of the same photos is 0.99 for an outline and 0.29 for a box.
+/// such as on a plain background. The smallest difference in these 62 photos is 0.99 for an outline and 0.29 for a box.
 const MIN_DIFFERENCE: f64 = 0.15;
 /// Minimum contrast at the border, in grey values, of marks that may be right although their colour difference is
 /// small: they may follow elements of a pattern. The value is above a camera's noise.
@@ -76,8 +76,8 @@ impl MarksReading {
     }
 }
 
-/// The reading in which the marks fit the photo far better than as they are, or [`MarksReading::OtherPhoto`]; `None` if
-/// they may be right, if one covers most of the photo, or if there are none.
+/// The reading in which the marks fit the photo far better than unchanged, or [`MarksReading::OtherPhoto`]. `None` if
+/// the marks may be right, if one part covers most of the photo, or if there are no marks.
 pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksReading> {
     let pixels = f64::from(image.width()) * f64::from(image.height());
     let is_crop = |annotation: &&Annotation| annotation.region().area() > MAX_COVER * pixels;

@@ -7,9 +7,9 @@
 //! Labels are in a `data.yaml`; classes are indices into its `names`, and its `kpt_shape` defines the format of a line.
 //!
 //! # Source
-//! The dataset format of Ultralytics' pose models. As in its loader, a byte order mark and blank lines are accepted.
-//! Coordinates may be up to a pixel outside the image; in its loader, up to a hundredth of the image. Lines that begin
-//! with `#` are comments, and skipped.
+//! The dataset format of Ultralytics' pose models. As in Ultralytics' loader, a byte order mark and blank lines are
+//! accepted. Coordinates may be up to a pixel outside the image; in that loader, up to a hundredth of the image. Lines
+//! that begin with `#` are comments, and skipped.
 
 use std::fmt::Write;
 
@@ -149,7 +149,7 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
     draft.finish(image)
 }
 
-/// Refuses a row that may be corners of an oriented box or of a segment, which have as many numbers as a box and
+/// Refuses a row that may be corners of an oriented box or of a segment: such rows have as many numbers as a box and
 /// keypoints without visibilities.
 fn check_is_pose(line: &str, place: &str) -> Result<()> {
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();

@@ -49,7 +49,7 @@ fn a_coco_file_of_another_tool_has_box_and_outline() {
     assert_eq!((found.label.as_str(), found.bbox), ("fuel_line", expected.bbox));
     assert_eq!(found.grasp, None);
     let mask = |annotation: &Annotation| annotation.outline.as_ref().unwrap().rasterize(640, 480);
-    // That tool stores the outline of whole pixels without their lower right edges; the part is ten pixels wide.
+    // The file stores the outline of whole pixels without their lower right edges; the part is ten pixels wide.
     let overlap = mask(&found).iou(&mask(&expected));
     assert!(overlap > 0.75, "{overlap}");
 }
@@ -98,7 +98,7 @@ fn what_one_format_holds_comes_back_from_every_other() {
 
 #[test]
 fn damaged_files_end_in_an_error_or_in_what_can_be_marked() {
-    // Every byte of every file, truncated there and replaced by others: no panic, and never a position outside the
+    // Every byte of every file, truncated there and replaced by other bytes: no panic, and never a position outside the
     // image.
     let files: [(&[u8], Option<&[u8]>); 4] = [
         (YOLO_POSE, None),

@@ -7,9 +7,9 @@ use crate::simulated_person;
 use sdg_demonstration::{Demonstration, propose_outline, propose_outline_with};
 use sdg_geometry::{BoundingBox, Polygon};
 
-/// Measured on the paper's eight parts: 0.954 as drawn and 0.957 a tenth looser; the minimum is the thin fuel line's,
-/// 0.905 and 0.889. OpenCV's grabCut, with its five rounds, has 0.960 and 0.956 on the same boxes. On all twelve: 0.954
-/// and 0.955.
+/// Mean overlap on the paper's eight parts: 0.954 with boxes as drawn, 0.957 with boxes a tenth looser. The minimum is
+/// that of the thin fuel line (0.905 and 0.889). OpenCV's grabCut, with its five rounds, has means of 0.960 and 0.956
+/// on the same boxes. On all twelve parts: 0.954 and 0.955.
 const MIN_MEAN_OVERLAP: f64 = 0.93;
 const MIN_OVERLAP: f64 = 0.85;
 
@@ -101,7 +101,7 @@ fn lamp(number: usize) -> Lamp {
 /// `MIN_SHADOW`'s minimum) had 0.774 and 0.572.
 const HARD_SHADOWS: [f64; 2] = [0.785, 0.577];
 
-/// Shadows of small lamps: sharp, darker than those above, half of them without a tint.
+/// Shadows of small lamps: sharp, mostly darker than those of [`lamp`], half of them without a tint.
 fn small_lamp(number: usize) -> Lamp {
     let dark = [0.5, 0.35, 0.22, 0.12][number % 4];
     let length = [0.08, 0.15, 0.25, 0.35][(number / 2) % 4];
@@ -137,17 +137,17 @@ fn hard_shadows_are_left_out() {
 /// Minimum fraction of a shadow, beside the part, for an outline that includes it.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// A shadow is removed if the outline is nearly as good as that of the same photo without the shadow: it has at most
-/// this much more of the shadow's area.
+/// A shadow is removed if the outline includes a fraction of it that is larger by at most this than in the outline
+/// proposed on the same photo without the shadow.
 const SHADOW_OUT: f64 = 0.15;
-/// It also has at least this fraction of the other outline's overlap with the true one.
+/// The outline must also keep this fraction of the overlap that the photo without the shadow gives.
 const OVERLAP_KEPT: f64 = 0.9;
 /// Issue 47: eight of ten.
 const MIN_REMOVED: f64 = 0.8;
 
 /// One click or one stroke of a simulated person removes a shadow. Measured: 28 of 35 each; without the search for
 /// shadows 12 and 20. The first fifteen pictures, on which the constants were chosen, are left out (21 of 23 each);
-/// some of those here were also inspected, in darker shadows.
+/// some of the pictures used here were also inspected, in darker shadows.
 #[test]
 fn one_click_or_one_stroke_removes_a_shadow() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outlines");

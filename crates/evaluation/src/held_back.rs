@@ -1,5 +1,5 @@
-//! Tests a finished model on held-out samples, which are used neither for teaching nor for calibration. The counts are
-//! those of `sdg evaluate --pictures`.
+//! Tests a finished model on held-out samples, which are used neither for teaching nor for calibration. Results are
+//! counted as by `sdg evaluate --pictures`.
 
 use std::ops::RangeInclusive;
 

@@ -62,8 +62,8 @@ impl MotionDrawing {
     }
 }
 
-/// Draws the motion and the detected part as an animation, and its last picture, in a folder. Returns the files. The
-/// part stays at its detected position on the table.
+/// Draws the motion and the detected part, as an animation and its last picture, into files in a folder. Returns the
+/// files. The part stays at its detected position on the table.
 ///
 /// # Errors
 /// Files cannot be written, or rendering fails.
@@ -81,7 +81,7 @@ pub fn draw_dry_run(
     DRY_RUN.draw(folder, &config, &positions)
 }
 
-/// Draws consecutive motions among the obstacles of a workcell in a folder. Returns the files.
+/// Draws consecutive motions among the obstacles of a workcell into files in a folder. Returns the files.
 ///
 /// # Errors
 /// Files cannot be written, or rendering fails.

@@ -13,7 +13,7 @@ const ASSUMED_FRICTION: f64 = 0.6;
 /// Approximate resolution of the wrist camera on the table, in pixels per metre; a finer photo would be compared with
 /// coarser pictures.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
-/// Maximum assumed mass of a body, in kg: the arm's load.
+/// Maximum assumed mass of a body, in kg: the maximum load of the arm.
 const MAX_ASSUMED_KG: f64 = 3.0;
 
 /// A part made from a model, with the model for the simulated camera.

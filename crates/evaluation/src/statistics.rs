@@ -90,8 +90,8 @@ mod tests {
 
     #[test]
     fn wilson_agrees_with_known_values() {
-        // 8 of 10 (49.0 to 94.3 %) and 0 of 10 (to 27.8 %) are in textbooks; the others were computed in another
-        // language.
+        // 8 of 10 (49.0 to 94.3 %) and 0 of 10 (to 27.8 %) are in textbooks; the remaining values were computed in
+        // another language.
         for (count, of, low, high) in [
             (8, 10, 0.4902, 0.9433),
             (0, 10, 0.0, 0.2775),

@@ -11,7 +11,7 @@ use crate::error::{FileError, Result};
 pub enum Access {
     /// Exclusive.
     Alone,
-    /// Shared with others that request shared access.
+    /// Shared with other processes that request shared access.
     Shared,
 }
 
@@ -32,7 +32,7 @@ impl Lock {
         Ok(is_taken.then_some(Self(file)))
     }
 
-    /// Whether no process holds the exclusive lock of a file; false if there is no such file, or no locks.
+    /// Whether no process holds the exclusive lock of a file; false if the file or the file system's locks are missing.
     pub fn is_free(path: &Path) -> bool {
         File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
     }

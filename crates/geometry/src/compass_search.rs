@@ -16,7 +16,7 @@ pub struct CompassSearch {
 impl CompassSearch {
     /// The best point found from `start` along four coordinates, and its score.
     ///
-    /// `neighbour` moves a point along a coordinate by a step with its sign; `None` if that move is not allowed.
+    /// `neighbour` moves a point along a coordinate by a positive or negative step; `None` if that move is not allowed.
     pub fn climb<P: Copy>(
         &self,
         start: P,

@@ -34,7 +34,7 @@ impl PlanarGrasp {
     ///
     /// # Source
     /// Paper, section IV-C. The original takes the most frequent whole degree and shifts it by an amount that depends
-    /// on the angle; total least squares with `atan2` avoids the errors of both steps.
+    /// on the angle. Total least squares with `atan2` avoids the errors of these two steps.
     pub fn from_keypoints(keypoints: &[Keypoint], width: f64) -> Option<Self> {
         let labelled: Vec<(f64, Point2<f64>)> = keypoints
             .iter()

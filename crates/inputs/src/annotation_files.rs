@@ -83,9 +83,9 @@ impl AnnotationFile {
     }
 }
 
-/// Finds the marks beside a photo: `photo.coco.json` (written by `sdg annotate` if another tool's photo.json must be
-/// kept), `photo.json` (written otherwise, or LabelMe) or `photo.txt` (YOLO-pose); or a file of the same name below
-/// `labels`, if a YOLO dataset keeps its pictures below `images`.
+/// Finds the marks beside a photo: `photo.coco.json`, `photo.json` (COCO or LabelMe) or `photo.txt` (YOLO-pose); for a
+/// YOLO dataset with pictures below `images`, a text file of the photo's name below `labels`. `sdg annotate` writes
+/// `photo.coco.json` only if another tool's `photo.json` must be kept.
 ///
 /// # Errors
 /// No such file exists. The message lists the searched names and how to create one.

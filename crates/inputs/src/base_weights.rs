@@ -18,11 +18,12 @@ pub type Origin = BTreeMap<String, String>;
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads this project's base weights for the network of `options`, without the parts named in `reinitialized`, and the
-/// [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has no network.
+/// Reads this project's base weights for the network of `options`, without the parameters with a prefix in
+/// `reinitialized`, and the [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has
+/// no network.
 ///
 /// # Errors
-/// The file cannot be read, the weights are of another preset, or a named part does not exist.
+/// The file cannot be read, the weights are of another preset, or no parameter has a given prefix.
 pub fn read_own(
     path: &Path,
     options: &TeachOptions,
@@ -62,13 +63,13 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
-/// Reads the weights in `path` for `network`, without the parts named in `reinitialized`. If the file contains only a
-/// backbone, the rest of the network is initialised randomly and need not be named.
+/// Reads the weights in `path` for `network`, without the parameters with a prefix in `reinitialized`. If the file
+/// contains only a backbone, the rest of the network is initialised randomly and need not be named.
 ///
 /// `tell` receives the report of the conversion before the values are read.
 ///
 /// # Errors
-/// The file cannot be read, the weights are for another network or another image input, or a named part does not exist.
+/// The file cannot be read, the weights are for another network or another image input, or no parameter has a prefix.
 pub fn read(
     path: &Path,
     network: &RcnnConfig,

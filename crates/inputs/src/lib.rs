@@ -6,7 +6,7 @@
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Every error names the file. Not in this crate: command arguments and outputs.
+//! Most errors name the file. Not in this crate: command arguments and outputs.
 //!
 //! ```no_run
 //! use std::path::Path;

@@ -1,4 +1,4 @@
-//! Errors of pictures, each with the expected and the found value.
+//! Errors of pictures, most with the expected and the found value.
 
 use thiserror::Error;
 

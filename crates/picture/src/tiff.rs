@@ -202,7 +202,7 @@ impl<'a> File<'a> {
         Some(Page { at, entries, next: self.number(first + count * entry_bytes, offset_width)? })
     }
 
-    /// The same file with a different first page.
+    /// A copy of the file with a different first page.
     fn with_first_page(&self, at: u64) -> Vec<u8> {
         let mut bytes = self.bytes.to_vec();
         let (width, place) = self.offset_width();

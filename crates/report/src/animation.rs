@@ -30,7 +30,7 @@ pub struct AnimationOptions {
     /// Maximum width in pixels; wider frames are scaled down.
     pub max_width: u32,
     /// Maximum size of the file in bytes. To reach it, colours, then frames, then pixels are reduced. If this is not
-    /// enough, the smallest result is used, which is larger.
+    /// enough, the file exceeds the maximum.
     pub max_bytes: usize,
     /// Time in seconds for which the last frame is shown before the animation restarts.
     pub hold_last_secs: f64,

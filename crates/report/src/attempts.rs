@@ -35,8 +35,8 @@ pub struct AttemptSummary {
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians at the bottom if there are several; `steps` are the names of the steps in order,
-/// `done` is the outcome of a successful attempt ("held").
+/// The table of attempts, with medians at the bottom if there are several. `steps` are the names of the steps in order,
+/// and `done` is the name of success ("held").
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
@@ -99,8 +99,8 @@ pub fn attempts_table(steps: &[&str], done: &str, attempts: &[AttemptSummary]) -
     ])
 }
 
-/// Detections and outcomes: the rows are classes of the last detection's error, the columns are the steps (of `steps`)
-/// at which attempts failed, and `done`, the outcome of a successful attempt.
+/// Detections and outcomes: numbers of attempts by the class of the last detection's error (rows) and by the step at
+/// which the attempt failed (columns). The last column, named `done`, is success.
 ///
 /// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]

@@ -10,7 +10,7 @@
 //! SVG. It follows the reader's light or dark theme, adapts to a phone's width, and can be printed.
 //!
 //! Not in this crate: grasp models, simulation and burn. The types are plain data, so that the crate compiles in
-//! seconds and has no restriction on its callers.
+//! seconds and any crate can use it.
 //!
 //! ```
 //! use image::RgbImage;

@@ -194,7 +194,7 @@ impl Table {
         self
     }
 
-    /// Sets the last row, which is separated from the others: medians or totals.
+    /// Sets the last row, which is separated from the other rows: medians or totals.
     ///
     /// # Panics
     /// If the number of cells differs from the number of columns.

@@ -72,7 +72,7 @@ function watchWidth(watched, redraw) {
   });
 }
 
-/** Uses the same model on the other device; if that fails, switches back. */
+/** Uses the open model on the other device; if that fails, switches back. */
 async function changeDevice() {
   stopCamera();
   if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
@@ -197,7 +197,7 @@ async function detectInPicture(picture, mine) {
       picture.small.textContent = error.message;
     }
   }
-  // After the search, which rejects files that are not pictures or are too large to be shown.
+  // Decoded for display only after the search, because the search rejects files that are no pictures or are too large.
   if (!picture.bitmap && !picture.error) {
     picture.bitmap = await shownBitmap(picture.file).catch(() => null);
     if (picture.bitmap) {

@@ -1,4 +1,4 @@
-// The thread of the model, which keeps the page responsive. One request at a time, answered in order.
+// The thread of the model: it keeps the page responsive. One request at a time, answered in order.
 //
 //   {id, open: ArrayBuffer}                    a model file      → {id, summary}
 //   {id, look: Blob, verify}                   an image file     → {id, record, milliseconds, decoded}

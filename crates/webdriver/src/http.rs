@@ -12,7 +12,7 @@ pub(crate) fn request(driver: SocketAddr, method: &str, path: &str, body: Option
     let mut stream = TcpStream::connect_timeout(&driver, Duration::from_secs(5))?;
     stream.set_read_timeout(Some(LONGEST_ANSWER))?;
     let body = body.unwrap_or_default();
-    // In a single write: a head in its own packet would wait for its acknowledgement.
+    // In a single write: after a head in its own packet, the body would wait until the head is acknowledged.
     let request = format!(
         "{method} {path} HTTP/1.1\r\nHost: {driver}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\
          Connection: close\r\n\r\n{body}",

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Result, WebDriverError};
 
-/// A served folder; its thread ends with the process.
+/// A folder that is served until the process ends.
 #[derive(Debug)]
 pub struct Site {
     address: SocketAddr,
@@ -32,7 +32,7 @@ pub fn serve_folder(folder: PathBuf) -> Result<Site> {
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let folder = folder.clone();
-            // A browser opens more connections than it uses; none may block the others.
+            // A browser opens more connections than it uses; no connection may block another.
             std::thread::spawn(move || answer(&stream, &folder));
         }
     });

@@ -20,7 +20,7 @@ const IN_ZIP: &[u8] = b"in a zip:";
 /// End of the pickle's name in the zip.
 const PICKLE: &str = "data.pkl";
 
-/// Names and bytes of the entries of torch's zip, which are not compressed.
+/// Names and bytes of the entries of torch's zip; the entries are not compressed.
 fn entries_of_zip() -> Vec<(String, Vec<u8>)> {
     let whole = file(&format!("{FIXTURES}/tensors_zip.pth"));
     let number = |at: usize, size: usize| (0..size).fold(0, |sum, k| sum | usize::from(whole[at + k]) << (8 * k));

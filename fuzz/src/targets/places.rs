@@ -36,7 +36,7 @@ pub(super) const CAMERA_FILE: Target = Target {
     ],
     seeds: || {
         let shipped = file("datasets/workcell/camera.yaml");
-        // Up to the section `table`.
+        // The file up to its section `table`.
         let lens =
             shipped.split(|byte| *byte == b'\n').take_while(|line| !line.starts_with(b"table:")).collect::<Vec<_>>();
         let beside = [lens.join(&b'\n').as_slice(), OVER_BASE].concat();

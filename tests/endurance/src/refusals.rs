@@ -16,7 +16,7 @@ use crate::files::{contents_under, files_under, fresh};
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 
-/// How long a page that rejected a request gets to end on its own.
+/// Time in which a page that rejected a request may end on its own.
 const ENDING: Duration = Duration::from_secs(3);
 
 /// A fault of the machine.

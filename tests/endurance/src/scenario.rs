@@ -204,7 +204,7 @@ impl Scenario {
         }
     }
 
-    /// Checks by its kind that a file left by a command can be read.
+    /// Checks that a file left by a command can be read as a file of its kind.
     ///
     /// # Errors
     /// A damaged file.

@@ -93,7 +93,7 @@ impl Course {
         }
     }
 
-    /// Prints the fifth tenth and the last; the tenths before are the start-up. Processor time is compared only if
+    /// Prints the fifth tenth and the last; the first four tenths are the start-up. Processor time is compared only if
     /// every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
@@ -137,7 +137,7 @@ fn frames(places: &Places) -> Result<Vec<Vec<u8>>> {
     (0..NUM_FRAMES).map(moved).collect()
 }
 
-/// The model file of a letter, taught once.
+/// The path of the model with this letter, which is taught if the file is missing.
 fn model(places: &Places, letter: &str) -> Result<String> {
     let folder = places.work.join("once");
     fs::create_dir_all(&folder)?;
@@ -276,7 +276,7 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     fs::create_dir(folder.join("state"))?;
     let demonstrations = places.root.join("datasets/demonstrations/pendulum");
     let photo = fs::read(demonstrations.join("image.png"))?;
-    // The marks in the form that the page expects, which it reads from the shipped file.
+    // The page reads the shipped marks and returns them in the form that it expects.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
     let mut server =

@@ -1,4 +1,4 @@
-//! Requests and their answers: JSON in, JSON out, errors as `{"error": "one line"}`.
+//! Requests and their answers: JSON in, JSON or a picture out, most errors as `{"error": "one line"}`.
 //!
 //! Pictures have numbers, which are valid for one session. A request with the header `Sdg-Session` is answered only if
 //! its value is the id in `GET /api/session`, otherwise with 412: a page of an earlier server must not change another
@@ -12,7 +12,7 @@
 //! | `POST /api/projects/{id}/open` | opens a project listed in `start` |
 //! | `DELETE /api/projects` | closes the open project |
 //! | `GET /api/others/{id}/picture` | another picture of the project's folder |
-//! | `POST /api/others/{id}/photo`, `/api/others/{id}/try` | makes it a photo of the part, or a picture to try |
+//! | `POST /api/others/{id}/photo`, `/api/others/{id}/try` | makes the picture a photo of the part, or a picture to try |
 //! | `POST /api/images?name=` | adds a photo of the part |
 //! | `PUT /api/label` | renames the object |
 //! | `PUT /api/region` | sets the searched region; null for the whole picture |
@@ -24,18 +24,18 @@
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | progress of the teaching; starts it; ends it with its current result |
 //! | `POST /api/trial-pictures?name=` | adds a picture to try |
-//! | `GET /api/trial-pictures/{id}/picture` | that picture |
-//! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
-//! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
-//! | `POST /api/trial-pictures/{id}/would-help` | best scores of S in other pictures with this further photo |
-//! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not there, or revokes that |
+//! | `GET /api/trial-pictures/{id}/picture` | a picture to try |
+//! | `POST /api/trial-pictures/{id}/detect` | grasps in the picture |
+//! | `POST /api/trial-pictures/{id}/accept` | makes the picture a demonstration with the given marks |
+//! | `POST /api/trial-pictures/{id}/would-help` | best scores of S in other pictures, if the picture were a photo of the part |
+//! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not in the picture, or revokes the statement |
 //! | `PUT /api/models/{id}/current` | uses a version of the model from `GET /api/session` |
 //! | `POST /api/models/{id}/compare/{other}` | detections of two versions in the pictures to try |
 //! | `GET /api/live` | the number of the camera's newest frame, and the camera's fault |
-//! | `GET /api/live/{number}/picture` | that frame, as JPEG |
-//! | `POST /api/live/{number}/detect` | grasps in it |
-//! | `POST /api/live/{number}/photo` | writes it as a photo of the part |
-//! | `POST /api/live/{number}/keep` | makes it a picture to try |
+//! | `GET /api/live/{number}/picture` | a frame that was shown, as JPEG |
+//! | `POST /api/live/{number}/detect` | grasps in the frame |
+//! | `POST /api/live/{number}/photo` | writes the frame as a photo of the part |
+//! | `POST /api/live/{number}/keep` | makes the frame a picture to try |
 
 mod answers;
 mod detections;

@@ -62,8 +62,8 @@ fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 impl Session {
-    /// The number of the offered picture with this name and content: a picture of the folder that was chosen or
-    /// dropped on the page is used where it lies, without a copy.
+    /// The number of the offered picture with this name and content. A picture of the folder that is dropped on the
+    /// page is thus used without a copy.
     pub(super) fn same_other(&self, name: &str, bytes: &[u8]) -> Option<usize> {
         let mut state = self.state();
         let other = state.others().into_iter().find(|other| other.name == name)?;

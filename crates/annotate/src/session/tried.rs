@@ -14,7 +14,7 @@ use crate::session_state::{MarkedPicture, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, TrialPictureView, VersionFound};
 
-/// A query whether learning from a picture would help in others.
+/// A query whether learning from a picture would help in other pictures.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HelpQuestion {
@@ -72,8 +72,8 @@ impl Session {
         Ok(state.trial_picture_view(id))
     }
 
-    /// Declares that the part is not in a tried picture, which becomes a negative of the next teaching; or revokes
-    /// this.
+    /// Declares that the part is not in a tried picture, which becomes a negative of the next teaching; or revokes the
+    /// declaration.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration, or the project cannot be written.

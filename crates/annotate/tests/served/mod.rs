@@ -209,7 +209,7 @@ impl Served {
         Self::with_patience(PATIENCE)
     }
 
-    /// The same with another maximum silence.
+    /// A server with this maximum silence of connections.
     pub fn with_patience(patience: Duration) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image: PathBuf = folder.path().join("photo.png");
@@ -230,7 +230,7 @@ impl Served {
         Self::open(folder, SessionOptions { images, ..SessionOptions::default() }, PATIENCE)
     }
 
-    /// The same with pictures to try from another folder.
+    /// Like [`Self::of_photo`], with pictures to try from another folder.
     pub fn of_photo_and_tried(folder: tempfile::TempDir, name: &str, tried: &std::path::Path) -> Self {
         let images = vec![(folder.path().join(name), None)];
         let trial_pictures = vec![tried.to_owned()];

@@ -29,8 +29,8 @@ pub struct AugmentArgs {
     /// The augmentation: edge (used in teaching), or paper (as in the paper)
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
-    /// Write the held-out samples instead, of at most 640x480 pixels: on them, `sdg teach` with the same seed tests the
-    /// finished model. It uses the first 24
+    /// Write the held-out samples instead, of at most 640x480 pixels; `sdg teach` with the same seed tests the finished
+    /// model on the first 24 of these samples
     #[arg(long, conflicts_with = "preset")]
     pub held_back: bool,
     /// Seed of all random choices

@@ -140,7 +140,7 @@ fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
     page.draw_box();
     page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
     page.settle();
-    // From the part, so that the area is connected with it.
+    // Strokes start on the part, so that the selected area is connected with the part.
     let stroke = |[x, y]: [f64; 2]| {
         page.click("button[data-tool=in]");
         let middle = [0.5 * (HOLD[0] + x), 0.5 * (HOLD[1] + y)];
@@ -277,7 +277,8 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
     page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
     page.browser.drag(&[page.on_screen([300.0, 243.5])]).unwrap();
     page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
-    // In the step of the outline and in that of the gripper. The outline's clickable area covers the whole rod.
+    // The gripper can be dragged in the step of the outline and in the step of the gripper. The outline's clickable
+    // area covers the whole rod.
     for step in ["#do-outline h2", "#do-grasp h2"] {
         page.click(step);
         page.settle();

@@ -12,7 +12,7 @@ pub struct Block {
     pub text: String,
 }
 
-/// The reason why a block is not run with the others.
+/// The reason why a block is not run with the other blocks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Marker {
     /// Hardware, a network, root or a browser is needed: the block is never run.

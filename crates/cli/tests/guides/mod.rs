@@ -43,8 +43,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
-/// The documents that a user reads, without decisions and results, which describe the past, and without the page's
-/// style, whose variables look like options.
+/// The documents that a user reads. Decisions and results are left out because they describe the past; the page's style
+/// is left out because its variables look like options.
 fn documents() -> Vec<(String, String)> {
     let listed = Process::new("git")
         .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", "*.md"])

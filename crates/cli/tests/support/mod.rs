@@ -14,7 +14,7 @@ use std::process::{Command, Output};
 use image::RgbImage;
 use sdg_demonstration::{Annotation, ImageFacts};
 
-/// Runs `sdg` and waits until it exits. Fields of its JSON that no document describes fail the test.
+/// Runs `sdg` and waits until it exits. Fields of the printed JSON that no document describes fail the test.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap();
     documented::assert_fields_are_documented(arguments, &output.stdout);
@@ -37,7 +37,8 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
 /// without a camera.
 ///
 /// Thirty tests need one of the two models, each in its own process, and teaching takes five seconds on one core. The
-/// first test that needs a model therefore teaches it, for this program and these inputs, and the others copy the file.
+/// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy the
+/// file.
 pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
     fs::create_dir_all(&folder).unwrap();

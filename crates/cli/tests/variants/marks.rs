@@ -74,7 +74,7 @@ pub fn in_json(dice: &mut Pcg64Mcg, value: &Value, recipe: &str) -> Marks {
     }
 }
 
-/// Marks in LabelMe's own fields; shapes in any order, among others.
+/// Marks in LabelMe's own fields; shapes in any order, among other shapes.
 pub fn labelme(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Value {
     let group = pick(dice, &[json!(1), json!(null), json!("7"), json!(12)]).clone();
     let [x1, y1, x2, y2] = scene.corners;

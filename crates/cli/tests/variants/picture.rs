@@ -107,7 +107,7 @@ fn png(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     named(dice, &["png", "PNG"], recipe, file.bytes())
 }
 
-/// A plain TIFF of 8-bit RGB, the basis of the others.
+/// A plain TIFF of 8-bit RGB, the basis of the other TIFFs.
 fn plain_tiff(photo: &RgbImage) -> Tiff {
     Tiff {
         size: photo.dimensions().into(),

@@ -55,8 +55,8 @@ impl Augmenter {
         Ok(Self { parts, others: Vec::new(), config, frame, seed, noises, normal })
     }
 
-    /// The same with other parts among the distractors: they are cut out of their photos along their outlines. Their
-    /// other marks are not used.
+    /// Adds other parts to the distractors: they are cut out of their photos along their outlines. Their other marks
+    /// are not used.
     ///
     /// # Errors
     /// An annotation that does not lie on its image, or has no outline for cutting out the part.
@@ -70,8 +70,8 @@ impl Augmenter {
         Ok(self)
     }
 
-    /// Only windows of the frame, just large enough for the part at any angle and size: the same scale, tables,
-    /// distractors and light in a smaller picture, so that most of a network's computation concerns the part. Sides are
+    /// Only windows of the frame, just large enough for the part at any angle and size, so that most of a network's
+    /// computation concerns the part. Scale, tables, distractors and light are those of whole frames. Sides are
     /// multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;

@@ -45,7 +45,7 @@ impl Frame {
 
 /// Paints the whole canvas with one surface, or with two that meet at an edge.
 ///
-/// Texture sizes follow the frame's width, so that textures look the same at any size and in any window of it.
+/// Texture sizes follow the frame's width, so that textures look the same in frames of any size and in windows.
 pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &mut SampleRng) {
     paint_surface(canvas, bank, part, rng);
     if chance(rng, 0.3) {

@@ -31,13 +31,13 @@ pub enum AugmentationStyle {
 pub struct PaperStyle {
     /// Turned by a whole number of degrees in `[-max, max]`.
     pub max_rotation_deg: i32,
-    /// Colour channels are multiplied by a number between these.
+    /// Colour channels are multiplied by a number in this range.
     pub channel_gain: [f32; 2],
     /// Probability that each channel has its own factor instead of a common one.
     pub per_channel_probability: f32,
     /// Shifted by a whole number of the photo's pixels in `[-max, max]` along each axis.
     pub max_shift_px: i32,
-    /// Scaled about the centre by a number between these.
+    /// Scaled about the centre by a number in this range.
     pub scale: [f32; 2],
 }
 
@@ -121,7 +121,7 @@ impl AugmentationConfig {
         Self { output_size: None, style: AugmentationStyle::Paper(PaperStyle::default()) }
     }
 
-    /// The same with samples of `width` × `height` pixels.
+    /// These settings with samples of `width` × `height` pixels.
     pub fn with_output_size(self, width: u32, height: u32) -> Self {
         Self { output_size: Some([width, height]), ..self }
     }

@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use sdg_geometry::Polygon;
 
-/// Signed distances are clamped to this: soft edges and shadows need no more.
+/// Maximum distance in both directions; larger ones are clamped, because soft edges and shadows need no more.
 pub(crate) const BAND_PX: f32 = 24.0;
 
 /// For every pixel centre of a `width` × `height` raster the distance to the outline, positive inside, clamped to

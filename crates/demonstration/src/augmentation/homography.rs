@@ -48,7 +48,7 @@ impl Homography {
         Self(self.0 * first.0)
     }
 
-    /// The inverse. Panics on a map that flattens the plane, which no caller makes.
+    /// The inverse. Panics on a map that flattens the plane; no caller makes one.
     pub fn inverse(&self) -> Self {
         Self(self.0.try_inverse().expect("an augmentation never flattens the plane"))
     }

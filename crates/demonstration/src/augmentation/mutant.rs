@@ -137,8 +137,8 @@ impl Silhouette {
         (0..GRID).contains(&x) && (0..GRID).contains(&y) && self.inside[(y * GRID + x) as usize]
     }
 
-    /// The largest overlap of the mutant's silhouette with the part's over all angles, with equal centres, and areas
-    /// equalised as far as a camera's change of height could.
+    /// The largest overlap (IoU) of the mutant's silhouette with the part's over all angles, with equal centres. The
+    /// areas are equalised, but only as far as another height of the camera could equalise them.
     fn max_iou(&self, mutant: &Mutant) -> f64 {
         let step = mutant.radius / 30.0;
         let mut places = Vec::new();

@@ -57,7 +57,7 @@ impl Prepared {
         prepared
     }
 
-    /// The same without [`Self::mutants`], which take most of the time.
+    /// Like [`Self::new`], without [`Self::mutants`], which take most of the time.
     pub fn without_mutants(demonstration: &Demonstration, output: [u32; 2], rng: &mut SampleRng) -> Self {
         let image = &demonstration.image;
         let photo_size = [f64::from(image.width()), f64::from(image.height())];

@@ -28,7 +28,8 @@ pub struct SampleObject {
     pub keypoints: Vec<Keypoint>,
     /// The outline, not clipped; `None` if none was drawn.
     pub outline: Option<Polygon>,
-    /// The pose of the demonstration in the sample: the similarity nearest to the warp, which is also slightly tilted.
+    /// The pose of the demonstration in the sample: the similarity nearest to the warp, which also tilts
+    /// slightly.
     pub image_from_demonstration: PlanarSimilarity,
     /// Index of its demonstration.
     pub demonstration_idx: usize,

@@ -84,7 +84,7 @@ impl Studio<'_> {
         let least = if positive { 0 } else { 1 };
         let most =
             if positive && own_table { self.style.max_distractors.div_ceil(2) } else { self.style.max_distractors };
-        // The same number per length as in the whole frame: fewer in a window, but still some beside the part.
+        // In proportion to the window's side: fewer in a window, but still some beside the part.
         let share = f64::from(self.size[0] * self.size[1]) / f64::from(self.frame[0] * self.frame[1]);
         let most = ((most as f64 * share.sqrt()).ceil() as usize).max(least);
         let count = least + index_below(rng, most + 1 - least);
@@ -143,7 +143,7 @@ impl Studio<'_> {
                 }
             }
         }
-        // The photo's light if the photo is around it, otherwise a slightly different one.
+        // The photo's light if the part is on its own table, otherwise a slightly different one.
         let gain: [f32; 3] = if own_table { [1.0; 3] } else { std::array::from_fn(|_| uniform(rng, 0.9, 1.1)) };
         let level = if own_table { 1.0 } else { uniform(rng, 0.75, 1.15) };
         let (edge, feather) = (uniform(rng, -0.3, 1.2), uniform(rng, 0.5, 1.6));

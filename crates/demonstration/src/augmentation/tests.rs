@@ -151,7 +151,7 @@ fn boxes_are_tight_around_the_part() {
 fn scenes_without_the_part_have_no_object_and_show_none_of_it() {
     let augmenter = augmenter(SceneStyle { positive_share: 0.0, ..SceneStyle::default() });
     assert!((0..20).all(|index| augmenter.sample(index).objects.is_empty()));
-    // After erasing it from its own photo, no red is left.
+    // After erasing the part from its photo, no red is left.
     let part = Prepared::new(&demonstration(true), [320, 240], &mut sample_rng(1, Stream::Preparation, 0));
     assert!(part.background.pixels.iter().all(|p| p[0] < 1.5 * p[1]), "red remains");
     let share = {

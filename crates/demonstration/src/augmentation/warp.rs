@@ -17,7 +17,7 @@ use sdg_geometry::PlanarSimilarity;
 const FRACTION_BITS: u32 = 32;
 /// Fractional bits used for weights. Weights then sum to 256, and 255 · 256 still fits a lane.
 const WEIGHT_BITS: u32 = 8;
-/// Fractional bits of a gain, which must be below 16.
+/// Fractional bits of a gain. Gains must be below 16.
 const GAIN_BITS: u32 = 12;
 /// Pixels passed from interpolation to gain at a time; they stay in the nearest cache.
 const BLOCK: usize = 64;

@@ -67,8 +67,8 @@ impl Component {
         self.log_peak - 0.5 * self.distance_squared(color)
     }
 
-    /// Whether the colour is this one with less light: L* + [`BLACK`], a* and b* are then all smaller by one factor,
-    /// because all are proportional to the cube root of the light.
+    /// Whether the colour is this Gaussian's with less light: L* + [`BLACK`], a* and b* are then all smaller by one
+    /// factor, because all are proportional to the cube root of the light.
     fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
         let shade = (color.x + BLACK) / (self.mean.x + BLACK);
         let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);
@@ -175,7 +175,7 @@ impl ColorMixture {
     pub fn log_density(&self, color: &Lab) -> f32 {
         let color = vector(color);
         let densities = || self.components.iter().map(|component| component.log_density(&color));
-        // The largest is factored out, because otherwise all of them could underflow.
+        // The largest is factored out, because otherwise all densities could underflow.
         let largest = densities().fold(f32::NEG_INFINITY, f32::max);
         largest + densities().map(|density| (density - largest).exp()).sum::<f32>().ln()
     }
@@ -239,7 +239,7 @@ mod tests {
         let mixture = ColorMixture::learn(&colors()).unwrap();
         assert!(mixture.explains(&Lab([71.0, -1.0, 3.0])) && mixture.explains(&Lab([20.0, 30.0, 0.0])));
         assert!(!mixture.explains(&Lab([45.0, 15.0, 1.0])), "between the groups");
-        // Nine times as many of the one as of the other: a difference of ln 9 = 2.2.
+        // Nine times as many light colours as dark ones: a difference of ln 9 = 2.2.
         let apart = mixture.log_density(&Lab([71.0, -1.0, 3.0])) - mixture.log_density(&Lab([20.0, 30.0, 0.0]));
         assert!((apart - 2.2).abs() < 0.5, "{apart}");
     }

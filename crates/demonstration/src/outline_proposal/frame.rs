@@ -21,7 +21,7 @@ const MAX_EVIDENCE: f32 = 10.0;
 pub(crate) struct Frame {
     pub width: usize,
     pub colors: Vec<Lab>,
-    /// The pixels that may belong to the part: those whose centres lie in the box. The others are surroundings.
+    /// The pixels that may belong to the part: those whose centres lie in the box. The other pixels are surroundings.
     pub candidates: Vec<bool>,
     /// Colours of the whole photo outside the box, subsampled.
     pub elsewhere: Vec<Lab>,
@@ -180,7 +180,7 @@ impl Frame {
         along_edges / f64::max(length, 1.0)
     }
 
-    /// The colours of the marked pixels, and those of the others.
+    /// The colours of the marked pixels, and those of the other pixels.
     pub fn colors_of(&self, marked: &[bool]) -> (Vec<Lab>, Vec<Lab>) {
         let mut colors = (Vec::new(), Vec::new());
         for (color, &marked) in self.colors.iter().zip(marked) {

@@ -1,8 +1,8 @@
 //! Several guesses of the part, each cut, and the choice of the cut that a person meant with the box.
 //!
-//! The constants of the choice were fitted on 30 pictures of generated parts (seeds from 2^51, boxes as drawn and
-//! looser by a twelfth), on the shipped demonstrations, and on the five photographs that docs/comparison-with-tools.md
-//! reports; not on the tests' pictures.
+//! The constants of the choice were not fitted on the tests' pictures, but on 30 pictures of generated parts (seeds
+//! from 2^51, boxes as drawn and looser by a twelfth), the shipped demonstrations, and the five photographs of
+//! docs/comparison-with-tools.md.
 
 use super::color_mixture::ColorMixture;
 use super::frame::Frame;
@@ -18,11 +18,11 @@ const MAX_GAP: f64 = 0.1;
 const GAP_COST: f64 = 2.0;
 /// Bonus of the guess without shadows: a shadow's border is an edge, too, and reaches the box.
 const UNSHADED_BONUS: f64 = 0.15;
-/// Another cut gets [`UNSHADED_BONUS`], too, if it leaves out a shadow, of at least this fraction, that the cut of the
-/// guess without shadows includes: colours learnt from a cut often include a hard shadow. Fitted on wing bolt, drill
-/// screw and the tuned rendered sets of datasets/split.toml and on generated parts (seeds from 2^51), 367 proposals:
-/// with 0.08, 0.1, 0.12 and 0.15 the overlap of 10, 8, 8 and 5 proposals is better by 0.02 or more, that of none worse;
-/// the overlap on the wing bolt's photos is 0.69, 0.69, 0.69 and 0.65, and 0.58 without this rule.
+/// Another cut also gets [`UNSHADED_BONUS`] if it leaves out a shadow of at least this fraction that the cut of the
+/// guess without shadows includes: colours learnt from a cut often include a hard shadow. Fitted on 367 proposals, of
+/// wing bolt, drill screw and the tuned rendered sets of datasets/split.toml, and of generated parts (seeds from 2^51):
+/// with 0.08, 0.1, 0.12 and 0.15 the overlap of 10, 8, 8 and 5 proposals is better by 0.02 or more, and of none worse.
+/// The overlap on the wing bolt's photos is 0.69, 0.69, 0.69 and 0.65; without this rule it is 0.58.
 const MIN_SHADOW: f64 = 0.1;
 /// Bonus of a cut that uses the colours of the whole photo: it decides between cuts that follow edges about equally
 /// well. With 0, 0.05 and 0.1 the shipped pneumatic cylinder's overlap was 0.846, 0.871, 0.871.
@@ -80,8 +80,8 @@ impl Cut {
     }
 }
 
-/// Initial divisions of the frame, with and without additional colours of the surroundings: those of the whole photo
-/// identify a shadow, but if another object resembles the part, its colours would assign the part to the surroundings.
+/// Initial divisions of the frame, with and without the colours of the whole photo as surroundings. These colours
+/// identify a shadow, but if another object resembles the part, they would assign the part to the surroundings.
 fn guesses<'a>(frame: &'a Frame, surroundings: Option<&ColorMixture>) -> Vec<Guess<'a>> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()

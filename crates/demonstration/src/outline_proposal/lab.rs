@@ -21,7 +21,7 @@ impl Lab {
     /// IEC 61966-2-1 and CIE 15.
     pub fn from_srgb(rgb: [u8; 3]) -> Self {
         let [r, g, b] = rgb.map(|level| LINEAR[usize::from(level)]);
-        // Each relative to the white point.
+        // X, Y and Z, relative to those of the white point.
         let x = (0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.950_47;
         let y = 0.212_672_9 * r + 0.715_152_2 * g + 0.072_175 * b;
         let z = (0.019_333_9 * r + 0.119_192 * g + 0.950_304_1 * b) / 1.088_83;

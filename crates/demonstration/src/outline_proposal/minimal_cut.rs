@@ -13,7 +13,7 @@ use super::lab::Lab;
 pub(crate) const SURELY_OUTSIDE: f32 = 1e3;
 /// Cost of a boundary in a flat area of the picture, per pixel of its length.
 const BOUNDARY_COST: f32 = 10.0;
-/// Fraction of that cost that remains on the strongest edges; it keeps outlines smooth.
+/// Fraction of [`BOUNDARY_COST`] that remains on the strongest edges; it keeps outlines smooth.
 const MIN_COST_SHARE: f32 = 0.05;
 /// Number of passes over the picture.
 const PASSES: usize = 60;

@@ -8,15 +8,15 @@
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
 //!         └───────────────────────────◀─────────────────────────────────┤
 //!              the largest piece that runs along edges and reaches the box ─ outer_outline ─ Polygon
-//! strokes ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
+//! strokes ─ the pieces of the picture that they select keep their side; the pixels around the pieces are cut again
 //! ```
 //!
 //! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): the mismatch of each pixel's colour with its side,
 //! and the boundary's length, which is cheaper along edges of the picture. There are three differences. A part's shadow
-//! is mostly inside the box and would be learnt as the part's colour, so that one guess excludes colours of the
-//! surroundings in shadow. No single guess suits every photo, so that several are cut and compared by the meaning of a
-//! person's box: the part's outline runs along edges, and reaches the box. The cut is found as a convex problem, whose
-//! boundaries have no preference for the pixels' axes, in 60 passes over the picture, instead of by a maximum flow.
+//! is mostly inside the box and would be learnt as the part's colour; therefore one guess excludes colours of the
+//! surroundings in shadow. No single guess suits every photo; therefore several are cut and compared by the meaning of
+//! a person's box: the part's outline runs along edges, and reaches the box. The cut is not found by a maximum flow,
+//! but as a convex problem, in 60 passes over the picture: its boundaries have no preference for the pixels' axes.
 //!
 //! It uses no knowledge of parts, and no randomness. The same photo and box give the same outline.
 
@@ -53,8 +53,8 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     propose_outline_with(image, bbox, &[])
 }
 
-/// The same, corrected by strokes in drawing order: each selects the piece of the picture on which it lies. Strokes
-/// outside the box are ignored.
+/// Like [`propose_outline`], corrected by strokes in drawing order: each selects the piece of the picture on which it
+/// lies. Strokes outside the box are ignored.
 pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[OutlineStroke]) -> Polygon {
     outline_in(image, bbox, None, strokes)
 }
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_dark_part_beside_something_as_dark_is_found() {
-        // The area below the box has the part's colour, so that the surroundings explain all of the part.
+        // The area below the box has the part's colour, so the surroundings explain all of the part.
         let image = RgbImage::from_fn(200, 180, |x, y| {
             let dark = (60..140).contains(&x) && ((50..110).contains(&y) || y >= 118);
             let noise = (x * 7 + y * 13) as u8 % 5;

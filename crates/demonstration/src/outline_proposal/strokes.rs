@@ -3,8 +3,8 @@
 //! A stroke on the wrong side of the cut selects the whole piece of the picture there: the pixels reached from the
 //! stroke by small steps of colour, without leaving the wrong side. A stroke over a shadow selects the whole shadow:
 //! colours of the surroundings in the shadow under the stroke, and in weaker ones. The part is then cut again, and the
-//! changes near the stroke are applied. People draw into the middle of the wrong area, so that the distance from the
-//! stroke to the part's border indicates the size of that area.
+//! changes near the stroke are applied. People draw into the middle of the wrong area, so the distance from the stroke
+//! to the part's border indicates the size of that area.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,7 +18,7 @@ use super::stroke::Stroke;
 /// Largest sum of colour differences on the path to a pixel of the region, in units of L*a*b*. Chosen by hand: a
 /// shadow's edge is about 20 units wide; the steps of an even surface sum to less than 10.
 const MAX_WAY: f32 = 14.0;
-/// Largest difference of a region's pixel from the stroke's pixel from which it is reached, in the same units.
+/// Largest difference of a region's pixel from the stroke's pixel from which it is reached, in units of L*a*b*.
 const MAX_DIFFERENCE: f32 = 24.0;
 /// Added to the colour difference of each step: close pixels come first, and noise does not lead across the whole
 /// picture.
@@ -31,10 +31,10 @@ const REACH: f32 = 5.0;
 /// A stroke for the part takes in colours of the table within this many times its distance to the part's border: parts
 /// may have the table's colour.
 const TABLE_REACH: f32 = 1.0;
-/// Minimum value of that distance for [`REACH`], in pixels.
+/// Minimum distance to the part's border that [`REACH`] multiplies, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// Edge strengths at which a selected shadow ends; of these, the one is used that leaves the part whose border runs
-/// most along edges.
+/// Edge strengths at which a selected shadow ends. Each is tried, and the shadow is removed that leaves the part with
+/// the largest fraction of its border along edges.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
 /// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
 /// shadow.
@@ -42,11 +42,11 @@ const MIN_SHADOW_PX: f32 = 3.0;
 /// Minimum size of the largest piece that remains without a shadow, as a fraction of the part; otherwise the part has
 /// the shadow's colour.
 const MIN_LEFT: f64 = 0.12;
-/// Minimum size of that piece, as a fraction of all that remains.
+/// Minimum size of the largest remaining piece, as a fraction of all that remains.
 const MIN_IN_ONE_PIECE: f64 = 0.6;
 /// Minimum area of another piece of the same shadow, as a fraction of the part's area.
 const MIN_PIECE_SHARE: f64 = 0.005;
-/// Largest difference of such a piece's mean colour from that under the stroke, in units of L*a*b*.
+/// Largest difference of the other piece's mean colour from that under the stroke, in units of L*a*b*.
 const MAX_PIECE_DIFFERENCE: f32 = 14.0;
 /// Number of rounds of learning colours and cutting after a stroke.
 const ROUNDS: usize = 3;
@@ -109,8 +109,8 @@ impl<'a> Correction<'a> {
         (RADIUS_SHARE * (self.frame.width as f64).hypot(self.frame.height() as f64)) as f32
     }
 
-    /// All of the part that belongs to the shadow under a stroke, on both sides of the part, and the fraction along
-    /// edges of the remaining part; `None` if there is no shadow under it.
+    /// The shadow under a stroke, as pixels of the part; before it, the fraction of the remaining part's border that
+    /// runs along edges. `None` if there is no shadow under the stroke.
     fn shadow(&self, stroke: &Stroke, max_edge: f32) -> Option<(f64, Vec<bool>)> {
         let Self { frame, in_part, pinned, .. } = self;
         let surroundings = self.surroundings.as_ref().filter(|_| !stroke.is_inside)?;

@@ -1,8 +1,9 @@
 //! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture. A label file with a picture's name belongs to that picture even if it contains another
-//! name, because people rename files. Every other label file belongs to the pictures that it names.
+//! COCO beside the picture. A file with the labels of one picture belongs to the picture with the file's name, even if
+//! another picture is named in the file, because people rename files. Every other label file belongs to the pictures
+//! that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -38,7 +39,7 @@ pub struct LabelledFolder {
 impl LabelledFolder {
     /// Reads every label and checks it against its picture, before the detection, which takes long.
     ///
-    /// If the labels have several names, the instances with `label` count, or without it those with the model's object.
+    /// With `label`, only its instances count. Otherwise, if there are several labels, only the model's object counts.
     /// If there is a `truth.json`, no other label is read.
     ///
     /// # Errors

@@ -48,7 +48,7 @@ struct Beside {
 }
 
 impl Beside {
-    /// The same detection relative to an equivalent direction of the label: the one for which offset and angle are
+    /// This detection relative to an equivalent direction of the label: the one for which offset and angle are
     /// nearest to those of `other`.
     fn turned_to(&self, other: &Self) -> Self {
         let count = match self.symmetry {
@@ -71,7 +71,7 @@ impl Beside {
     }
 }
 
-/// The offset between labels and detections, if most detections that hit no instance have the same one.
+/// The offset between labels and detections, if most detections that hit no instance agree on one.
 pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     let beside: Vec<Beside> = tested.iter().flat_map(|tested| beside_labels(tested, min_score)).collect();
     let agreeing = |seed: &Beside| {
@@ -99,8 +99,8 @@ pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     })
 }
 
-/// Each detection that hits no instance, relative to the nearest label that was not found. They are assigned one to
-/// one, in order of decreasing score.
+/// Each detection that hits no instance, relative to the nearest label that was not found. Detections and labels are
+/// assigned one to one, in order of decreasing score.
 fn beside_labels(tested: &Tested, min_score: f64) -> Vec<Beside> {
     let judged = judge(tested, min_score);
     let mut free: Vec<&TrueGrasp> = tested

@@ -50,8 +50,8 @@ pub struct TrueGrasp {
 }
 
 impl Truth {
-    /// The ground truth of an instance. If the labels do not state its size and symmetry, the size follows from the
-    /// length of its marks (relative to the mean over several demonstrations), and the symmetry is the model's.
+    /// The ground truth of an instance. If the labels do not state size and symmetry, the size follows from the length
+    /// of the instance's marks (relative to the mean over several demonstrations), and the symmetry is the model's.
     pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
@@ -372,7 +372,7 @@ mod tests {
     use super::*;
     use sdg_grasp::TurnSource;
 
-    /// An instance with a diagonal of 100 pixels, so that hits are within 4 pixels.
+    /// An instance with a diagonal of 100 pixels, so hits are within 4 pixels.
     fn truth(x: f64, degrees: f64, optional: bool) -> Truth {
         let grasp = TrueGrasp {
             center: Point2::new(x, 50.0),

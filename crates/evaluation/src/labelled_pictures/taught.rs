@@ -27,7 +27,7 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
     };
     let same =
         |x: u32, y: u32, dy: u32| picture.as_raw()[row(picture, x, y + dy)] == cutout.as_raw()[row(cutout, 0, dy)];
-    // The part crosses the middle row, so that few positions pass this test even on a plain background.
+    // The part crosses the middle row, so few positions pass this test even on a plain background.
     let middle = height / 2;
     for y in 0..=picture.height() - height {
         for x in 0..=picture.width() - width {
@@ -42,7 +42,7 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
 /// Maximum mean difference between a copy and the photo, in 8-bit levels; a JPEG of quality 50 causes about 4.
 const MAX_COPY_DIFFERENCE: f64 = 5.0;
 
-/// Left and top of the cut-out in a copy of the whole photo, at the same size; `None` if the picture is a different
+/// Left and top of the cut-out in a copy of the whole photo, at its size; `None` if the picture is a different
 /// one.
 fn find_copy(picture: &RgbImage, demonstration: &TaughtDemonstration) -> Option<[u32; 2]> {
     let middle = demonstration.marks.photo_middle?;

@@ -1,4 +1,4 @@
-//! Runs each model on every part's photo: it must find the part in its own photo, and nothing in the others.
+//! Runs each model on every part's photo: it must find the part in its own photo, and nothing in the other photos.
 
 use anyhow::{Context, Result};
 use image::RgbImage;

@@ -1,8 +1,8 @@
-//! Many parts that are taught from a folder of demonstrations; each model is run on every other part's photo. The
-//! results are one page.
+//! Many parts that are taught from a folder of demonstrations; each model is run on every part's photo. The results
+//! are one page.
 //!
 //! ```text
-//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every other part's photo
+//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every part's photo
 //!                                                               └─ findings: parts that look alike or need another photo ─ page
 //! OUT/models/NAME.sdg   OUT/parts/NAME.json   OUT/index.html
 //! ```

@@ -44,7 +44,7 @@ pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
     format!("held in {held} of {}", attempts.len())
 }
 
-/// Whether the physics failed (not files, OpenGL or settings), so that only this attempt fails.
+/// Whether the physics failed (not files, OpenGL or settings); then only this attempt fails.
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(
         error.downcast_ref::<SimulationError>(),

@@ -20,7 +20,7 @@ impl Cell<'_> {
         Self { model: self.model.taught_as(), ..self }
     }
 
-    /// Whether the cell's teaching failed, so that there is no model to test.
+    /// Whether the cell's teaching failed; there is then no model to test.
     pub(super) fn is_without_model(self, marks: Marks, store: &Store) -> Result<bool> {
         Ok(matches!(self.teaching_from(marks, store)?, Some(TeachingRecord::Failed { .. })))
     }
@@ -117,7 +117,7 @@ impl Marks {
     }
 }
 
-/// The attempts stored in a file; empty if an earlier version recorded them, so that they are made again.
+/// The attempts stored in a file; empty if an earlier version recorded them: they are then made again.
 ///
 /// # Errors
 /// The errors of [`Store::read_made_with`].

@@ -1,4 +1,4 @@
-//! Adds an error to every mark of a demonstration.
+//! Adds errors to the marks of a demonstration.
 
 use std::f64::consts::TAU;
 
@@ -8,16 +8,16 @@ use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine};
 
-/// Displacement of every mark, in pixels of the photo.
+/// Displacement of the marks, in pixels of the photo.
 pub const MARKS_JITTER_PX: f64 = 3.0;
 
 /// Number of directions tried for a vertex of the outline before it is left in place.
 const MAX_VERTEX_TRIES: usize = 40;
 
-/// The demonstration with both grasp marks, two opposite corners of the box and every vertex of the outline moved by
-/// `distance_px`, each in its own random direction, but not out of the picture. If a move would make the outline cross
-/// itself, another direction is tried, so that the outline remains valid on the annotation page. The jaw width is
-/// unchanged.
+/// The demonstration with moved points: both grasp marks, two opposite corners of the box and every vertex of the
+/// outline. Each moves by `distance_px` in its own random direction, but not out of the picture. If a move would make
+/// the outline cross itself, other directions are tried; if all fail, the vertex stays in place. The outline thus
+/// remains valid on the annotation page. The jaw width is unchanged.
 pub fn with_jittered_marks(demonstration: &Demonstration, distance_px: f64, seed: u64) -> Demonstration {
     const MARKS: u64 = 0x4d41_524b_5300_0000;
     let mut rng = Pcg64Mcg::seed_from_u64(seed ^ MARKS);

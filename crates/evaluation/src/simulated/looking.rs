@@ -27,8 +27,7 @@ pub(super) fn observe_picture(
 }
 
 /// A picture without the part: one to six unseen objects, some of which resemble parts. Every second picture also has
-/// another of the paper's eight parts, one after another: real parts in real finishes are the look-alikes of a
-/// workshop.
+/// another of the paper's eight parts, one after another, because the look-alikes in a workshop are real parts.
 pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Result<(TestView, Option<&'static str>)> {
     if number.is_multiple_of(2) {
         return Ok((test_views(object, false, 1, seed).next().context("a picture")??, None));

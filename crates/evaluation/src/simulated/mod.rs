@@ -13,7 +13,7 @@
 //! model's results on the pictures of a part are stored completely or not at all. A **cell** is one model on one part.
 //! Random choices depend only on the seed, the part and the number of the attempt or picture, so every model gets the
 //! same scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list)
-//! repeats them.
+//! repeats the attempts.
 //!
 //! In [`sharing`], many processes share the units, on the machines of a cluster.
 //!

@@ -32,9 +32,9 @@ pub(super) fn do_unit(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Converts a panic to an error, so that the other units are kept.
+/// Converts a panic to an error, so that the other units continue.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
-    // Unwind safety: all data that the closure was changing are dropped with its unit.
+    // Unwind safety: the data that the closure changes belong to its unit and are dropped with the unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<&str>().map(|message| (*message).to_owned());
         let message = message.or_else(|| panic.downcast_ref::<String>().cloned());

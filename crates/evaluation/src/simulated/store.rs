@@ -7,7 +7,7 @@
 //! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
 //! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten after each
 //! DIR/cells/C-pendulum.speed.json             seconds per picture
-//! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
+//! DIR/pictures/C-pendulum.png                 one of the unseen pictures, for the page
 //! DIR/axes/C-pendulum.tilt.json               pictures of an axis
 //! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
 //! DIR/cameras/C-pendulum.tilt.json            pictures of a set for calibrated cameras
@@ -32,7 +32,7 @@ use crate::error::EvaluationError;
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// The folder of an evaluation, locked by this process, alone or together with others.
+/// The folder of an evaluation, locked by this process, alone or together with other processes.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,

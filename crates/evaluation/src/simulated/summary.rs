@@ -77,8 +77,7 @@ pub struct Figures {
     pub held: Share,
     /// 95 % confidence interval (Wilson) of `held`.
     pub held_interval: [f64; 2],
-    /// Attempts that held the part, and found it in the first picture both from the look-out pose and from above; of
-    /// all attempts.
+    /// Attempts that held the part after one picture from the look-out pose and one from above, of all attempts.
     pub held_at_first_look: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,

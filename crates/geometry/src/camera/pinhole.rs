@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::lens::PlumbBob;
 use crate::GeometryError;
 
-/// A pinhole camera and its lens, in pixels whose first centre is at (0.5, 0.5).
+/// A pinhole camera and its lens, in pixels; the centre of the first pixel is at (0.5, 0.5).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PinholeCamera {
     /// Image width.

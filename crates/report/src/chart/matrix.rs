@@ -42,7 +42,7 @@ impl Matrix {
         Self { title: title.into(), columns, good_column: None, rows: Vec::new(), caption: None }
     }
 
-    /// Sets the column of successes; the others are shaded as failures.
+    /// Sets the column of successes; the other columns are shaded as failures.
     #[must_use]
     pub fn good_column(mut self, column: usize) -> Self {
         self.good_column = Some(column);

@@ -1,5 +1,5 @@
-//! Plots: the data of line charts in this file; their drawing, matrices of counts and charts of fractions in the
-//! others.
+//! Plots: the data of line charts in this file; their drawing, matrices of counts and charts of fractions in
+//! submodules.
 
 mod frame;
 mod matrix;

@@ -66,7 +66,7 @@ impl FittedScale {
     fn logarithmic(low: f64, high: f64) -> Self {
         let ratio = high / low;
         let (low, high) = if ratio < 1.0 + 1e-9 { (low / 2.0, high * 2.0) } else { (low, high) };
-        // Up to three decades, there are ticks at 1, 2 and 5 of each; with more decades, at every decade or every few.
+        // Up to three decades, there are ticks at 1, 2 and 5 of each; with more, at every decade or every few decades.
         let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
         let factors: &[f64] = if last - first <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let stride = ((last - first) / 6).max(1) as usize;

@@ -101,8 +101,8 @@ pub fn draw_demonstration(
 }
 
 /// Draws detections, ordered by decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with score
-/// and verdict. No tag covers another tag or the middle of a grasp if there is room for it at a corner of its box.
-/// Returns the areas of the tags.
+/// and verdict. Each tag is at the corner of its detection's box where it covers least of the earlier tags and of the
+/// grasps' middles. Returns the areas of the tags.
 ///
 /// A refused detection has a dashed box and no gripper, because it is not grasped.
 pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec<BoundingBox> {

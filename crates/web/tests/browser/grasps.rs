@@ -18,9 +18,9 @@ const MAX_SCORE: f64 = 0.01;
 /// kept, and this changes the network's score (by 0.036 in one of the pictures). The grasp does not depend on this
 /// choice, because the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
-/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is five
-/// per second (200 ms): measured 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which
-/// this bound leaves room.
+/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is
+/// 200 ms. Measured: 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which this bound
+/// leaves room.
 const MAX_MILLISECONDS: f64 = 300.0;
 /// Number of timed searches, after those in which the module's functions are compiled.
 const LOOKS: usize = 7;
@@ -150,7 +150,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
     }
 }
 
-/// On SwiftShader, which is part of Chromium: slower than the processor, but with the same shaders.
+/// On SwiftShader, which is part of Chromium: slower than the processor, but with the shaders of a graphics card.
 #[test]
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn the_graphics_card_finds_what_the_command_line_finds() {
@@ -164,7 +164,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
-    // The page itself uses the graphics card and shows the same.
+    // The page itself uses the graphics card and shows the same grasps.
     browser
         .run("document.querySelectorAll('#pictures small').forEach((small) => (small.textContent = ''))", &[])
         .unwrap();

@@ -34,7 +34,7 @@ mod sections {
 
     #[derive(Subcommand)]
     enum Section {
-        /// Kills commands at random moments of a seed, with a simulated power cut; resumes an earlier run.
+        /// Kills commands at random moments (seeded), each with a simulated power cut; resumes an earlier run.
         Crash {
             /// Number of kills of each command.
             #[arg(long, default_value_t = 200)]

@@ -27,7 +27,7 @@ pub struct AnnotateArgs {
     /// recorded in IMAGE.sdg-project.json beside it; other files of its folder are ignored.
     ///
     /// Instead, DIR: one folder with a project in it (sdg-project.json). In a new project, pictures with marks beside
-    /// them are photos of the part and the others are pictures to try; if no picture has marks, the page asks which
+    /// them are photos of the part and other pictures are pictures to try; if no picture has marks, the page asks which
     /// picture is the photo.
     ///
     /// Without IMAGE, DIR and --from, the page lists recent projects, and creates a new one in the current folder from

@@ -24,7 +24,7 @@ pub struct HandEyeArgs {
     /// The camera file from `sdg camera calibrate`
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// Robot poses and the names of the pictures taken at them: YAML, JSON or CSV; the pictures are in the same folder
+    /// Robot poses and the names of the pictures taken at them: YAML, JSON or CSV; the pictures are in FILE's folder
     #[arg(long, value_name = "FILE")]
     poses: PathBuf,
     /// Where the camera is mounted: on the robot's hand, or fixed relative to its base

@@ -41,7 +41,7 @@ pub struct DetectArgs {
     #[arg(long, value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: Option<SizeTolerance>,
     /// The calibrated camera that took the pictures: grasps are also given in metres, and parts of a different size are
-    /// refused. For models taught with a camera, which may be a different one
+    /// refused. For models taught with a camera; that camera may be a different one
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
     /// Search only this part of each picture: left edge, upper edge, width and height in its pixels; "all" searches the

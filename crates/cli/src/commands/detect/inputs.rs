@@ -7,8 +7,8 @@ use sdg_inputs::{PictureInput, STANDARD_INPUT};
 
 use crate::exit::Usage;
 
-/// Checks that drawings do not replace pictures. A drawing has the name of its picture with the extension `.png`: in
-/// the pictures' folder, it would overwrite a PNG picture, and a second run would search the drawings as well.
+/// Checks that drawings do not replace pictures. A drawing has the name of its picture with the extension `.png`. In
+/// the pictures' folder it would overwrite a PNG picture, and a second run would search it as a picture.
 ///
 /// # Errors
 /// A picture is in this folder.

@@ -77,7 +77,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         }
         let parts = match finder.find(&picture, &frame) {
             Ok(parts) => parts,
-            // In a folder, an error in one picture does not affect the others.
+            // In a folder, an error in one picture does not affect other pictures.
             Err(error) if matches!(address, Address::Folder { .. }) => {
                 let error = anyhow::Error::from(error).context(format!("frame {} of {address}", frame.number));
                 write_error(&mut stdout, args, address, &error)?;

@@ -1,4 +1,4 @@
-//! `sdg evaluate --cameras`: parts taught with one calibrated camera, detected with others.
+//! `sdg evaluate --cameras`: parts taught with one calibrated camera, detected with other cameras.
 
 use anyhow::{Result, bail};
 use sdg_evaluation::Store;

@@ -13,7 +13,8 @@ pub struct SharingArgs {
     /// List the names of all units of work and exit; with --json also each unit's dependencies and whether it is done
     #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
     pub list_units: bool,
-    /// Run only these units, in the folder of --out, where other processes may run others; finished units are skipped
+    /// Run only these units, in the folder of --out, where other processes may run other units; finished units are
+    /// skipped
     #[arg(
         long,
         value_name = "NAME",
@@ -47,7 +48,7 @@ pub struct SharingArgs {
         help_heading = SHARING
     )]
     pub submit: Option<String>,
-    /// Run that script instead of printing it
+    /// Run the script of --submit instead of printing it
     #[arg(long, requires = "submit", help_heading = SHARING)]
     pub yes: bool,
     /// Number of cores requested for a unit

@@ -25,7 +25,7 @@ Sets on both sides of a split (--split FILE --sets DIR):
   wrong_turn, misplaced: within half a diagonal, wrong), hit (part, optional or null), distance_percent, turn_deg, and the fields of a
   detection of `sdg detect --json`.";
 
-/// Teaches and measures the sets that may be used for tuning and the others.
+/// Teaches and measures the sets that may be used for tuning and the sets that are only reported.
 #[derive(Debug, ClapArgs)]
 pub struct SplitArgs {
     /// Teach and measure the sets named in a file, separately for sets that may be used for tuning and sets that are
@@ -44,7 +44,7 @@ pub struct SplitArgs {
     /// The folder with the folders of the sets
     #[arg(long, value_name = "DIR", requires = "split", help_heading = SPLIT)]
     pub sets: Option<PathBuf>,
-    /// Only the tuned sets; the others are neither read nor printed
+    /// Only the tuned sets; the other sets are neither read nor printed
     #[arg(long, requires = "split", help_heading = SPLIT)]
     pub tuned: bool,
     /// Seeds of the teachings

@@ -34,7 +34,7 @@ pub struct RehearseArgs {
     #[command(flatten)]
     pub compute: ComputeArgs,
     /// The wrist camera: resolution, focal length and lens of this file, instead of 640x480 at 550 px without
-    /// distortion; its pose follows from the arm. For models taught with a camera, which then work in the plan view
+    /// distortion; its pose follows from the arm. For models taught with a camera; they then work in the plan view
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
     /// Put the part down at this place of the workcell file: NAME, or NAME:CELL for one cell of a tray; with NAME

@@ -1,4 +1,4 @@
-//! `sdg robot`: manual control of a real arm. Each command's arguments are in the command's file.
+//! `sdg robot`: manual control of a real arm. The arguments of most commands are in the commands' files.
 
 mod arm_args;
 mod hand;

@@ -1,4 +1,4 @@
-//! Compares two runs on the same pictures: whether their models differ, and the number of cases that would show it.
+//! Compares two runs on the same pictures: whether their models differ, and the number of cases needed to show it.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub struct RunDifference {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Number of cases by the runs that were correct: this run first, then the other one.
+    /// Numbers of cases that both runs, one run or no run solved; the first is this run.
     pub counts: PairedCounts,
     /// This run's fraction minus the other's.
     pub difference: f64,
@@ -65,7 +65,7 @@ impl Against {
         &self.folder
     }
 
-    /// Compares each model with itself in the other run, if both runs have the same pictures.
+    /// Compares each model with itself in the other run, in the cases that both runs have.
     ///
     /// # Errors
     /// Records cannot be read, or have other pictures.

@@ -13,7 +13,7 @@ use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
 /// Maximum position and angle error of a correct detection.
 pub(crate) const TOLERANCE: DetectionError = DetectionError { distance_mm: RIGHT_MM, angle_deg: RIGHT_DEGREES };
-/// The same on the axis of slants: a grasp that is off by more misses a narrow part.
+/// Maximum errors on the axis of slants: a grasp with larger errors misses a narrow part.
 pub(super) const SLANT_TOLERANCE: DetectionError = DetectionError { distance_mm: 3.0, angle_deg: 3.0 };
 
 pub(super) fn tolerance_on(axis: Axis) -> DetectionError {

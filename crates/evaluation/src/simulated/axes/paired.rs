@@ -1,4 +1,4 @@
-//! Two fractions of the same cases: their difference with its interval, and the number of cases that would show it.
+//! Two fractions of the same cases: their difference with its interval, and the number of cases needed to show it.
 
 use serde::Serialize;
 
@@ -156,8 +156,8 @@ mod tests {
 
     #[test]
     fn connor_s_number_of_cases_agrees_with_known_values() {
-        // From powerandsamplesize.com: discordant fractions of 0.45 and 0.05 need 23 pairs. The other case was computed
-        // by hand.
+        // From powerandsamplesize.com: discordant fractions of 0.45 and 0.05 need 23 pairs. The second case was
+        // computed by hand.
         assert_eq!(counts(5, 1, 9, 5).cases_needed(), Some(23));
         assert_eq!(counts(80, 10, 5, 5).cases_needed(), Some(469));
         assert_eq!(counts(80, 5, 5, 10).cases_needed(), None);

@@ -30,7 +30,7 @@ pub struct Answer {
 }
 
 impl PlacedDetection {
-    /// Whether the part was detected.
+    /// Whether the detection is accepted.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }

@@ -129,7 +129,7 @@ pub struct LookAlikeFigures {
 }
 
 impl LookAlikeFigures {
-    /// The sum over look-alikes of the part's size.
+    /// The sum over look-alikes that are as large as the part.
     pub const SAME_SIZE: &str = "same size";
     /// The sum over look-alikes that differ only in size, which is not visible without a calibrated camera.
     pub const SIZE_ALONE: &str = "size alone";
@@ -149,7 +149,7 @@ pub struct GraspFigures {
     pub held: Share,
     /// 95 % confidence interval (Wilson) of `held`.
     pub held_interval: [f64; 2],
-    /// Attempts that held the part, and found it in the first picture both from afar and from above; of all attempts.
+    /// Attempts that held the part after one picture from afar and one from above, of all attempts.
     pub held_at_first_look: Share,
     /// Attempts that held the part after further pictures, of all attempts.
     pub held_after_further_looks: Share,

@@ -83,7 +83,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// Whether the attempts are those of the paper's protocol, which are then shared with it.
+    /// Whether the attempts are those of the paper's protocol; they are then shared with the protocol.
     pub(super) fn is_in_protocol(&self, condition: GraspCondition) -> bool {
         condition == GraspCondition::NoError && self.search_points.is_none()
     }

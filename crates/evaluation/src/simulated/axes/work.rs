@@ -39,7 +39,7 @@ pub struct RunEnd {
 
 impl AxesEvaluation<'_> {
     /// Runs the remaining units until `is_interrupted` returns true, and keeps finished units. A failed unit does not
-    /// end the others, so that hours of work do not depend on one part: the error is printed, and the unit is tried
+    /// end other units, so that hours of work do not depend on one part: the error is printed, and the unit is tried
     /// again in the next run.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Faults of units for which no tables can be made: missing, running, failed, duplicate, or different from the receipt.
+//! Faults of units that prevent the tables: missing, running, failed, duplicate, or different from the receipt.
 
 use std::path::Path;
 

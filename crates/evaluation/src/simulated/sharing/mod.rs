@@ -12,8 +12,8 @@
 //! DIR/units/NAME/failed-*.json   the process and its error
 //! ```
 //!
-//! A **unit** has a constant name and its own folder, so that a process reads and writes the same few files for any
-//! number of units. Records contain the SHA-256 of the program in addition to the settings of the ordinary run. The
+//! A **unit** has a constant name and its own folder, so that a process reads and writes only a few files, however many
+//! units there are. Records contain the SHA-256 of the program in addition to the settings of the ordinary run. The
 //! shipped demonstrations are compiled into the program, so its hash includes them.
 //!
 //! Slurm, or a person, assigns the units to processes.

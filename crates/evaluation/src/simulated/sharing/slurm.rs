@@ -2,7 +2,7 @@
 //!
 //! Teaching runs are first; pictures and grasps start when these have ended; speed is measured at the end, each
 //! unit alone on a node. An array waits for the end of the previous one, not for its success: failed teaching does
-//! not block the units of other parts, and the units of its own part report that the model is missing.
+//! not block the units of other parts, and the units of the same part report that the model is missing.
 
 use std::fmt::Write;
 use std::path::Path;
