@@ -120,7 +120,8 @@ mod tests {
 
     #[test]
     fn numbers_in_names_are_ordered_by_value() {
-        let expected = ["_.png", "2.png", "10.png", "b.png", "p1.png", "P2.png", "p002.png", "p3a.png", "p3b.png", "p10.png"];
+        let expected =
+            ["_.png", "2.png", "10.png", "b.png", "p1.png", "P2.png", "p002.png", "p3a.png", "p3b.png", "p10.png"];
         let mut names = expected;
         names.sort_unstable();
         assert_ne!(names, expected);
