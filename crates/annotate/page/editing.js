@@ -14,9 +14,10 @@ export function adopt(view) {
   return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
 }
 
-/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
+/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. Returns whether a gripper beside the part was moved to it. */
 export function commit(found = null) {
   const target = image();
+  const hasMoved = followOutline(target, Boolean(found?.strokes.length));
   const now = JSON.stringify(target.marks, round);
   target.marks = JSON.parse(now);
   if (now !== target.committed || found?.strokes.length) {
@@ -27,6 +28,7 @@ export function commit(found = null) {
   }
   if (found) target.found = { ...found, outline: keyOf(target) };
   changed();
+  return hasMoved;
 }
 
 function travel(from, to) {
@@ -164,17 +166,20 @@ function snapBox(marks) {
 /** The last detection of an outline: the next one begins after it. */
 let lastProposal = Promise.resolve();
 
-/** Places the gripper again after a stroke changed the outline: one that was placed by a click or turned to fit and not changed since, or one whose middle is no longer on the part. Returns whether it lay beside the part. */
-function followOutline(target) {
+/** Places the gripper again after the outline changed: one that was placed by a click or turned to fit and not changed since, unless the place was beside the outline before as well; after a stroke also one whose middle is no longer on the part. Returns whether it lay beside the part. */
+function followOutline(target, isStroke) {
   const { grasp, outline } = target.marks;
-  if (!grasp) return false;
+  const { outline: before } = JSON.parse(target.committed);
+  if (!grasp || !outline || JSON.stringify(outline, round) === JSON.stringify(before)) return false;
   const { placed } = target;
   const isPlaced = placed?.grasp === JSON.stringify(grasp, round);
   const { center, length, angle } = gripperOf(grasp);
   const point = isPlaced ? placed.point : center;
   const isBeside = !isWithin(center, outline);
-  if (!isPlaced && !isBeside) return false;
-  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
+  const isOn = [outline, before].some((part) => part && isWithin(point, part));
+  if (!(isPlaced && isOn) && !(isStroke && isBeside)) return false;
+  // From a place beside the part to the middle of it; a gripper that was moved by hand stays close.
+  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, isPlaced ? Infinity : length);
   const kept = isPlaced ? placed.length : length;
   setGripper(placedAt(nearest, outline, { length: kept, before: angle }));
   target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round), length: kept };
@@ -215,8 +220,7 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
       if (isStroke && target.marks.box) snapBox(target.marks);
-      const hasMoved = isStroke && followOutline(target);
-      commit({ base, strokes, box: isStroke ? box : null });
+      const hasMoved = commit({ base, strokes, box: isStroke ? box : null });
       const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!isStroke) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
