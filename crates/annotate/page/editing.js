@@ -8,10 +8,10 @@ import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with its `found`, which is how its outline was found; `waiting`: strokes not yet answered; `placed`: the places and lengths of proposed grippers, by their marks as JSON. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [], placed: {} };
 }
 
 /** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. Returns whether a gripper beside the part was moved to it. */
@@ -113,7 +113,7 @@ export function boxDrawn() {
 export function placeGripper(point) {
   const part = region() ?? boxPolygon([0, 0, ...size()]);
   setGripper(placedAt(point, part));
-  image().placed = { point, grasp: JSON.stringify(marks().grasp, round) };
+  notePlaced(image(), { point });
   Object.assign(state, { selected: "grasp", tool: "select" });
   commit();
 }
@@ -129,6 +129,8 @@ export function closeOutline(points) {
 
 const boxOf = ({ marks: { box, outline } }) => box ?? (outline && boundsOf(outline));
 const keyOf = ({ marks: { outline } }) => JSON.stringify(outline);
+const graspKey = ({ marks: { grasp } }) => JSON.stringify(grasp, round);
+const notePlaced = (target, place) => (target.placed[graspKey(target)] = place);
 
 /** How a photo's outline was found: the outline that strokes corrected (null: detected in the box), the strokes, and the box within which they apply. An outline that was drawn, changed by hand or loaded is itself the one to correct. */
 const howFound = (target) => (target.found?.outline === keyOf(target) ? target.found : { base: target.marks.outline, strokes: [], box: null });
@@ -171,18 +173,17 @@ function followOutline(target, isStroke) {
   const { grasp, outline } = target.marks;
   const { outline: before } = JSON.parse(target.committed);
   if (!grasp || !outline || JSON.stringify(outline, round) === JSON.stringify(before)) return false;
-  const { placed } = target;
-  const isPlaced = placed?.grasp === JSON.stringify(grasp, round);
+  const placed = target.placed[graspKey(target)];
   const { center, length, angle } = gripperOf(grasp);
-  const point = isPlaced ? placed.point : center;
+  const point = placed ? placed.point : center;
   const isBeside = !isWithin(center, outline);
   const isOn = [outline, before].some((part) => part && isWithin(point, part));
-  if (!(isPlaced && isOn) && !(isStroke && isBeside)) return false;
+  if (!(placed && isOn) && !(isStroke && isBeside)) return false;
   // From a place beside the part to the middle of it; a gripper that was moved by hand stays close.
-  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, isPlaced ? Infinity : length);
-  const kept = isPlaced ? placed.length : length;
+  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, placed ? Infinity : length);
+  const kept = placed ? placed.length : length;
   setGripper(placedAt(nearest, outline, { length: kept, before: angle }));
-  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round), length: kept };
+  notePlaced(target, { point: nearest, length: kept });
   return isBeside;
 }
 
@@ -322,7 +323,7 @@ export function turnToFit() {
   const moved = Math.max(norm(sub(fitted.center, gripper.center)), Math.abs(fitted.width - gripper.width));
   if (Math.abs(Math.sin(fitted.angle - gripper.angle)) < MIN_TURN && moved < MIN_MOVE_PX) return toast("The gripper already fits.");
   setGripper(fitted);
-  image().placed = { point: fitted.center, grasp: JSON.stringify(marks().grasp, round), length: gripper.length };
+  notePlaced(image(), { point: fitted.center, length: gripper.length });
   commit();
 }
 

@@ -408,12 +408,14 @@ fn a_proposed_gripper_follows_the_outline_and_one_changed_by_hand_stays() {
     let shaded = page.saved();
     // Across plate and shadow, which is lower; then across the plate alone.
     assert!(shaded.grasp.unwrap().center().y > 227.0 && shaded.jaw_width.unwrap() > 105.0, "{shaded:?}");
-    let plate = take_out_the_shadow();
-    assert!((plate.grasp.unwrap().center().y - 220.0).abs() < 5.0, "{plate:?}");
-    assert!((80.0..95.0).contains(&plate.jaw_width.unwrap()), "{plate:?}");
-    page.browser.press(&["\u{e009}", "z"]).unwrap();
-    page.settle();
-    assert_eq!(page.saved(), shaded, "undone together");
+    for _ in 0..2 {
+        let plate = take_out_the_shadow();
+        assert!((plate.grasp.unwrap().center().y - 220.0).abs() < 5.0, "{plate:?}");
+        assert!((80.0..95.0).contains(&plate.jaw_width.unwrap()), "{plate:?}");
+        page.browser.press(&["\u{e009}", "z"]).unwrap();
+        page.settle();
+        assert_eq!(page.saved(), shaded, "undone together");
+    }
     page.fill("#grasp-width", "120");
     let plate = take_out_the_shadow();
     assert_ne!(plate.outline, shaded.outline);
