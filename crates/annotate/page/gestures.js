@@ -3,7 +3,7 @@
 import { add, direction, distanceTo, distanceToEdge, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
-import { KNOB_PX } from "./overlay.js";
+import { KNOB_PX, REACH_PX } from "./overlay.js";
 import { abandonRegion, drawingRegion, isChoosingRegion } from "./region.js";
 import { pan, toPhoto, zoom } from "./view.js";
 
@@ -191,16 +191,21 @@ function nearestVertex(place) {
   return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
 }
 
-/** The mark that is dragged from a place. On a thin part the outline can be grabbed everywhere; therefore between the jaws the closer of outline and gripper line is dragged. */
+/** The mark that is dragged from a place: between the jaws it is the gripper if its line is closer than the outline, whose reach covers thin parts; its middle and ends are taken before the outline's line, but not before its points. */
 function takenAt(target, from) {
   const taken = target.closest?.("[data-kind]");
   const { grasp, outline } = marks();
   if (taken?.dataset.kind !== "outline" || !grasp) return taken;
   const gripper = gripperOf(grasp);
   const along = direction(gripper.angle);
-  const [t, s] = [along, quarter(along)].map((axis) => Math.abs(dot(sub(from, gripper.center), axis)));
-  const isBetween = t <= gripper.length / 2 && s <= gripper.width / 2;
-  return isBetween && s < distanceTo(outline, from) ? overlay.querySelector("[data-kind=grasp][data-body]") : taken;
+  const arm = sub(from, gripper.center);
+  const [t, s] = [along, quarter(along)].map((axis) => dot(arm, axis));
+  const isBetween = Math.abs(t) <= gripper.length / 2 && Math.abs(s) <= gripper.width / 2;
+  const { scale } = state.view;
+  const isNear = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
+  const end = gripper.length / 2 + KNOB_PX / scale;
+  const handle = isNear(0) || (isBetween && Math.abs(s) < distanceTo(outline, from)) ? "body" : isNear(-end) ? "end=start" : isNear(end) && "end=end";
+  return handle ? overlay.querySelector(`[data-kind=grasp][data-${handle}]`) : taken;
 }
 
 /** The action begun by a pressed pointer. */

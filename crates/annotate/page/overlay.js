@@ -8,7 +8,7 @@ import { toScreen } from "./view.js";
 const SVG = "http://www.w3.org/2000/svg";
 const overlay = document.getElementById("overlay");
 /** Radius around a handle in which a pointer grabs it: larger for fingers. */
-const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
+export const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 /** Distance between the end of the line and its knob, so that knob and jaws stay apart however small the gripper is. */
 export const KNOB_PX = 20;
 /** Like `KNOB_PX`, for the dots of a detection, which are not dragged. */

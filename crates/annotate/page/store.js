@@ -1,5 +1,7 @@
 // The page's state. Code that changes it calls `changed`; everything that shows it is then redrawn, once per frame.
 
+import { boxPolygon } from "./geometry.js";
+
 export const state = {
   label: "",
   /** Whether the user gave that name; otherwise it is a proposal. */
@@ -100,5 +102,5 @@ export function region() {
   if (!image()) return null;
   const { outline, box } = marks();
   if (outline) return outline;
-  return box ? [[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]] : null;
+  return box ? boxPolygon(box) : null;
 }

@@ -218,7 +218,10 @@ function card(detection, i, listed, shown) {
   }
   if (isOpen && detection.cut) item.append(text("p", detection.cut, "warning"));
   const { outline, box } = detection.marks;
-  row.append(button("Zoom to it", () => showBox(outline ? boundsOf(outline) : box), "plain"));
+  row.append(button("Zoom to it", () => {
+    showBox(outline ? boundsOf(outline) : box);
+    stage.scrollIntoView({ block: "nearest" });
+  }, "plain"));
   item.append(row);
   return item;
 }

@@ -1,10 +1,43 @@
-//! Names of the files that the page writes.
+//! Names of the files that the page writes, and the order of those that it lists.
 
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 /// The last part of a path, for display.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The natural order of two names, as the page's: numbers by value (2 before 10), letters without regard to case.
+pub fn natural_order(a: &str, b: &str) -> Ordering {
+    pieces(a).cmp(pieces(b)).then_with(|| a.cmp(b))
+}
+
+/// A piece of a name, in the order of the kinds.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Piece<'a> {
+    Sign(char),
+    /// The number of digits without leading zeros, and these digits: of any length.
+    Number(usize, &'a str),
+    /// Of lower case.
+    Letter(char),
+}
+
+fn pieces(mut rest: &str) -> impl Iterator<Item = Piece<'_>> {
+    std::iter::from_fn(move || {
+        let first = rest.chars().next()?;
+        let num_digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        let (piece, after) = rest.split_at(num_digits.max(first.len_utf8()));
+        rest = after;
+        Some(if num_digits > 0 {
+            let digits = piece.trim_start_matches('0');
+            Piece::Number(digits.len(), digits)
+        } else if first.is_alphabetic() {
+            Piece::Letter(first.to_lowercase().next().unwrap_or(first))
+        } else {
+            Piece::Sign(first)
+        })
+    })
 }
 
 /// Combining accents, as in umlauts on macOS.
@@ -84,6 +117,21 @@ mod tests {
         assert_eq!(safe_stem("Bu\u{308}gel"), "Bu\u{308}gel");
         assert_eq!(safe_stem("…"), "part");
         assert_eq!(safe_stem(&"a".repeat(300)).len(), 60);
+    }
+
+    #[test]
+    fn numbers_in_names_are_ordered_by_value() {
+        let expected =
+            ["_.png", "2.png", "10.png", "b.png", "p1.png", "P2.png", "p002.png", "p3a.png", "p3b.png", "p10.png"];
+        let mut names = expected;
+        names.sort_unstable();
+        assert_ne!(names, expected);
+        names.sort_by(|a, b| natural_order(a, b));
+        assert_eq!(names, expected);
+        // More digits than any integer type has.
+        let long = "9".repeat(60);
+        assert_eq!(natural_order(&long, &format!("1{long}")), Ordering::Less);
+        assert_eq!(natural_order(&long, &long), Ordering::Equal);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use image::{ImageFormat, RgbImage};
 use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, decode_image, is_turned_by_exif};
 
 use crate::error::{Error, Result};
+use crate::names::{file_name, natural_order};
 
 /// Maximum size of a photo's file.
 pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
@@ -79,7 +80,7 @@ impl Picture {
     }
 }
 
-/// The pictures in a folder, sorted by name; subfolders are ignored.
+/// The pictures in a folder, in the natural order of their names; subfolders are ignored.
 ///
 /// # Errors
 /// The folder cannot be listed.
@@ -93,7 +94,7 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
             paths.push(path);
         }
     }
-    paths.sort();
+    paths.sort_by(|a, b| natural_order(&file_name(a), &file_name(b)));
     Ok(paths)
 }
 
@@ -154,7 +155,6 @@ mod tests {
             let found = image::guess_format(&bytes).unwrap().to_mime_type();
             assert_eq!(found, media_type, "{name}");
         }
-        let names: Vec<_> = pictures_in(folder.path()).unwrap();
-        assert_eq!(names.len(), 3);
+        assert_eq!(pictures_in(folder.path()).unwrap().len(), 3);
     }
 }

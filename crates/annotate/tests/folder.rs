@@ -110,6 +110,15 @@ fn a_tried_picture_of_another_folder_is_learnt_from_without_writing_there() {
 }
 
 #[test]
+fn pictures_of_a_folder_are_in_the_natural_order_of_their_names() {
+    let others = folder_of(&["p10.png", "P3.png", "p2.png"]);
+    let served = Served::of_photo_and_tried(folder_of(&["rod10.png", "rod9.png", "rod.png"]), "rod.png", others.path());
+    let session = session(&served);
+    assert_eq!(names(&session["trial_pictures"]), ["p2.png", "P3.png", "p10.png"]);
+    assert_eq!(names(&session["others"]), ["rod9.png", "rod10.png"]);
+}
+
+#[test]
 fn the_copy_of_a_tried_picture_is_not_offered_for_trying() {
     let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
     served.ask("POST", "/api/trial-pictures?name=007.png", &photo_png()).json();

@@ -18,8 +18,12 @@ pub fn advice_in_words(advice: Advice) -> &'static str {
         Advice::CheckSize => {
             "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm"
         }
-        Advice::DarkerPhoto => "if it is the part, a second --demo in darker light would help",
-        Advice::BrighterPhoto => "if it is the part, a second --demo in brighter light would help",
+        Advice::DarkerPhoto => {
+            "if it is the part, it is darker here than in the photo: a second --demo in this light would help"
+        }
+        Advice::BrighterPhoto => {
+            "if it is the part, it is brighter here than in the photo: a second --demo in this light would help"
+        }
         Advice::Uncover => "if it is the part, uncover it, or add a --demo taken from this side",
         _ => "if it is the part, a second --demo taken from this side would help",
     }

@@ -253,8 +253,12 @@ impl TaughtModel for PageModel {
 fn remedy(advice: Advice) -> String {
     let words = match advice {
         Advice::CheckSize => "if it is the part, learn from it: this size is then taught as well",
-        Advice::DarkerPhoto => "if it is the part, a second demonstration in darker light would help",
-        Advice::BrighterPhoto => "if it is the part, a second demonstration in brighter light would help",
+        Advice::DarkerPhoto => {
+            "if it is the part, it is darker here than in the photo: a second demonstration in this light would help"
+        }
+        Advice::BrighterPhoto => {
+            "if it is the part, it is brighter here than in the photo: a second demonstration in this light would help"
+        }
         Advice::Uncover => "if it is the part, uncover it, or add a demonstration taken from this side",
         _ => "if it is the part, a second demonstration taken from this side would help",
     };
@@ -297,6 +301,17 @@ mod tests {
     use super::*;
     use sdg_annotate::{Session, SessionOptions};
     use std::sync::Arc;
+
+    #[test]
+    fn advice_about_light_compares_the_picture_with_the_photo() {
+        for (advice, light) in [(Advice::DarkerPhoto, "darker"), (Advice::BrighterPhoto, "brighter")] {
+            for text in [crate::found_text::advice_in_words(advice).to_owned(), remedy(advice)] {
+                // In a dark picture, "in brighter light" was read as a demand for more light.
+                let compared = format!("it is {light} here than in the photo: a second ");
+                assert!(text.contains(&compared) && text.ends_with(" in this light would help"), "{text}");
+            }
+        }
+    }
 
     #[test]
     fn the_page_shows_the_opening_that_is_taught_where_a_file_states_none() {

@@ -88,9 +88,9 @@ impl EvidenceKind {
 pub enum Advice {
     /// A wider size tolerance or, with a calibrated camera, a check of the camera file and of the height of the marks.
     CheckSize,
-    /// A further photo in darker light.
+    /// A further photo in the picture's light, in which the part is darker than in the demonstration.
     DarkerPhoto,
-    /// A further photo in brighter light.
+    /// A further photo in the picture's light, in which the part is brighter than in the demonstration.
     BrighterPhoto,
     /// Uncover the part, or take a further photo from this side.
     Uncover,

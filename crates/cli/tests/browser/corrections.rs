@@ -305,6 +305,60 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn a_gripper_under_the_outline_is_taken_by_its_middle_and_ends() {
+    let page = Page::open();
+    page.browser.press(&["o"]).unwrap();
+    for corner in [[200.0, 180.0], [320.0, 180.0], [420.0, 285.0], [200.0, 285.0]] {
+        page.browser.drag(&[page.on_screen(corner)]).unwrap();
+    }
+    page.browser.press(&["\u{e007}"]).unwrap();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    // The gripper's line lies on the slanted edge of the outline, far from the handles of the box.
+    let line = [[360.0, 222.0], [370.0, 232.5], [380.0, 243.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&line).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    let before = page.saved();
+    let (grasp, outline) = (before.grasp.unwrap(), before.outline.unwrap());
+    // The marks after a drag in the step of the outline; the drag is then undone.
+    let drag = |[x, y]: [f64; 2], [dx, dy]: [f64; 2]| {
+        page.click("#do-outline h2");
+        page.settle();
+        page.browser.drag(&[0.0, 0.5, 1.0].map(|part| [x + part * dx, y + part * dy])).unwrap();
+        let after = page.saved();
+        page.browser.press(&["\u{e009}", "z"]).unwrap();
+        page.settle();
+        (after.grasp.unwrap(), after.outline.unwrap())
+    };
+    let (moved, kept) = drag(page.on_screen([grasp.center().x, grasp.center().y]), [30.0, 0.0]);
+    let way = moved.center() - grasp.center();
+    assert!(way.x > 5.0 && way.y.abs() < 1.0, "{way}");
+    assert_eq!(kept, outline);
+    for end in ["start", "end"] {
+        let (turned, kept) = drag(page.handle(&format!("[data-end='{end}'] .knob")), [20.0, 0.0]);
+        let turn = turned.angle().degrees() - grasp.angle().degrees();
+        assert!(turn.abs() > 5.0, "{end}: {turn}°");
+        assert_eq!(kept, outline, "{end}");
+    }
+    // Elsewhere, the line still gets a point.
+    let (kept, longer) = drag(page.on_screen([250.0, 285.0]), [0.0, 30.0]);
+    assert_eq!((kept, longer.vertices.len()), (grasp, outline.vertices.len() + 1));
+    // A point of the outline at the gripper's middle is taken before it.
+    page.click("#do-outline h2");
+    page.settle();
+    let vertex = page.handle("[data-vertex='1'] .knob");
+    let middle = page.on_screen([368.0, 230.0]);
+    page.browser.drag(&[vertex, [vertex[0] + 9.0, vertex[1] + 9.0], middle]).unwrap();
+    page.settle();
+    let there = page.saved().outline.unwrap();
+    let (kept, changed) = drag(page.handle("[data-vertex='1'] .knob"), [0.0, -40.0]);
+    assert_eq!(kept, grasp);
+    assert_eq!(changed.vertices.len(), there.vertices.len());
+    assert_ne!(changed, there);
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_gripper_on_a_removed_shadow_is_moved_to_the_part() {
     let folder = tempfile::tempdir().unwrap();
     shaded_plate().save(folder.path().join("photo.png")).unwrap();
@@ -324,10 +378,64 @@ fn a_gripper_on_a_removed_shadow_is_moved_to_the_part() {
     let saved = page.saved();
     let middle = saved.grasp.unwrap().center();
     assert!(saved.outline.unwrap().contains(&middle), "{middle}");
+    assert!((middle.x - 270.0).abs() < 15.0, "in the middle of the plate, not at its edge: {middle}");
     page.screenshot("corrections-3-moved");
     page.assert_accessible("a moved gripper");
     page.browser.press(&["\u{e009}", "z"]).unwrap();
     page.settle();
     assert!(page.saved().grasp.unwrap().center().x > 345.0, "undone with the outline");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_proposed_gripper_follows_the_outline_and_one_changed_by_hand_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    shaded_plate().save(folder.path().join("photo.png")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    let corners = [[196.0, 176.0], [300.0, 250.0], [424.0, 289.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&corners).unwrap();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.browser.drag(&[page.on_screen([300.0, 235.0])]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    let take_out_the_shadow = || {
+        page.click("[data-tool=out]");
+        let stroke = [[370.0, 230.0], [380.0, 260.0], [390.0, 275.0]].map(|place| page.on_screen(place));
+        page.browser.drag(&stroke).unwrap();
+        page.settle();
+        page.saved()
+    };
+    let shaded = page.saved();
+    // Across plate and shadow, which is lower; then across the plate alone.
+    assert!(shaded.grasp.unwrap().center().y > 227.0 && shaded.jaw_width.unwrap() > 105.0, "{shaded:?}");
+    for _ in 0..2 {
+        let plate = take_out_the_shadow();
+        assert!((plate.grasp.unwrap().center().y - 220.0).abs() < 5.0, "{plate:?}");
+        assert!((80.0..95.0).contains(&plate.jaw_width.unwrap()), "{plate:?}");
+        page.browser.press(&["\u{e009}", "z"]).unwrap();
+        page.settle();
+        assert_eq!(page.saved(), shaded, "undone together");
+    }
+    page.fill("#grasp-width", "120");
+    let plate = take_out_the_shadow();
+    assert_ne!(plate.outline, shaded.outline);
+    assert_eq!((plate.grasp, plate.jaw_width), (shaded.grasp, Some(120.0)), "changed by hand");
+    page.assert_quiet();
+
+    // A gripper that was placed in the box is placed again when the outline is found.
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    page.click("[data-clear=outline]");
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    assert!(page.saved().jaw_width.unwrap() > 100.0, "as wide as the box");
+    page.click("#propose");
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    let saved = page.saved();
+    let turn = saved.grasp.unwrap().angle().degrees().rem_euclid(180.0);
+    assert!((turn - 38.0).abs() < 12.0 && saved.jaw_width.unwrap() < 80.0, "along the handle: {saved:?}");
     page.assert_quiet();
 }

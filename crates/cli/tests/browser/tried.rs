@@ -288,6 +288,14 @@ fn a_part_at_the_border_is_told_and_the_result_is_below_the_picture_on_a_phone()
     assert!((0.0..40.0).contains(&below), "{below} px");
     page.screenshot("tried-5-phone");
     page.assert_accessible("the result on a phone");
+    // The button is far below the picture, which is scrolled into view.
+    let zoom = "const b = [...document.querySelectorAll('#found button')].find((b) => b.innerText === 'Zoom to it');
+        b.scrollIntoView({block: 'start'}); const before = scrollY; b.click(); return before";
+    assert!(page.browser.run(zoom, &[]).unwrap().as_f64().unwrap() > 0.0, "the page is scrolled");
+    page.settle_frames();
+    let in_sight = "const r = document.getElementById('stage').getBoundingClientRect();
+        return r.top >= -1 && r.bottom <= innerHeight + 1";
+    assert_eq!(page.browser.run(in_sight, &[]).unwrap(), json!(true));
     page.assert_quiet();
 }
 

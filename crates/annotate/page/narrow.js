@@ -1,0 +1,21 @@
+// On a narrow screen, some elements have other places, also in the document: Tab follows the order from top to bottom.
+
+const by = (id) => document.getElementById(id);
+const narrow = matchMedia("(max-width: 860px)");
+
+function place() {
+  const [inOut, steps, results] = ["in-out", "steps", "results"].map(by);
+  if (narrow.matches) {
+    // Above the photo: the panel is below it.
+    by("zoom-tools").before(inOut);
+    by("corner").after(steps);
+    // Directly below the pictures.
+    by("live").after(results);
+  } else {
+    by("do-outline").append(inOut);
+    by("corner").before(steps);
+    by("panel-try").append(results);
+  }
+}
+narrow.addEventListener("change", place);
+place();
