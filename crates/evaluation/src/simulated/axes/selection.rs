@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn no_name_is_everything_and_groups_stand_for_their_members() {
         let all = parse(&[]).unwrap();
-        assert_eq!((all.axes.len(), all.conditions.len()), (9, 6));
+        assert_eq!((all.axes.len(), all.conditions.len()), (10, 6));
         assert_eq!(parse(&["all"]).unwrap(), all);
         assert_eq!(parse(&["grasps", "pictures"]).unwrap(), all);
     }
