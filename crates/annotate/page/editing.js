@@ -8,16 +8,15 @@ import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered; `placed`: the places and lengths of proposed grippers, by their marks as JSON. */
+/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [], placed: {} };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
 }
 
-/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. Returns whether a gripper beside the part was moved to it. */
+/** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
 export function commit(found = null) {
   const target = image();
-  const hasMoved = followOutline(target, Boolean(found?.strokes.length));
   const now = JSON.stringify(target.marks, round);
   target.marks = JSON.parse(now);
   if (now !== target.committed || found?.strokes.length) {
@@ -28,7 +27,6 @@ export function commit(found = null) {
   }
   if (found) target.found = { ...found, outline: keyOf(target) };
   changed();
-  return hasMoved;
 }
 
 function travel(from, to) {
@@ -113,7 +111,7 @@ export function boxDrawn() {
 export function placeGripper(point) {
   const part = region() ?? boxPolygon([0, 0, ...size()]);
   setGripper(placedAt(point, part));
-  notePlaced(image(), { point });
+  image().placed = { point, grasp: JSON.stringify(marks().grasp, round) };
   Object.assign(state, { selected: "grasp", tool: "select" });
   commit();
 }
@@ -129,8 +127,6 @@ export function closeOutline(points) {
 
 const boxOf = ({ marks: { box, outline } }) => box ?? (outline && boundsOf(outline));
 const keyOf = ({ marks: { outline } }) => JSON.stringify(outline);
-const graspKey = ({ marks: { grasp } }) => JSON.stringify(grasp, round);
-const notePlaced = (target, place) => (target.placed[graspKey(target)] = place);
 
 /** How a photo's outline was found: the outline that strokes corrected (null: detected in the box), the strokes, and the box within which they apply. An outline that was drawn, changed by hand or loaded is itself the one to correct. */
 const howFound = (target) => (target.found?.outline === keyOf(target) ? target.found : { base: target.marks.outline, strokes: [], box: null });
@@ -168,22 +164,20 @@ function snapBox(marks) {
 /** The last detection of an outline: the next one begins after it. */
 let lastProposal = Promise.resolve();
 
-/** Places the gripper again after the outline changed: one that was placed by a click or turned to fit and not changed since, unless the place was beside the outline before as well; after a stroke also one whose middle is no longer on the part. Returns whether it lay beside the part. */
-function followOutline(target, isStroke) {
+/** Places the gripper again after a stroke changed the outline. A gripper that a person has drawn or changed stays if its middle is still on the part. Returns whether the middle was beside the part. */
+function followOutline(target) {
   const { grasp, outline } = target.marks;
-  const { outline: before } = JSON.parse(target.committed);
-  if (!grasp || !outline || JSON.stringify(outline, round) === JSON.stringify(before)) return false;
-  const placed = target.placed[graspKey(target)];
+  if (!grasp) return false;
+  const { placed } = target;
+  const isPlaced = placed?.grasp === JSON.stringify(grasp, round);
   const { center, length, angle } = gripperOf(grasp);
-  const point = placed ? placed.point : center;
+  const point = isPlaced ? placed.point : center;
   const isBeside = !isWithin(center, outline);
-  const isOn = [outline, before].some((part) => part && isWithin(point, part));
-  if (!(placed && isOn) && !(isStroke && isBeside)) return false;
-  // From a place beside the part to the middle of it; a gripper that was moved by hand stays close.
-  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, placed ? Infinity : length);
-  const kept = placed ? placed.length : length;
+  if (!isPlaced && !isBeside) return false;
+  const nearest = isWithin(point, outline) ? point : nearestWithin(outline, point, length);
+  const kept = isPlaced ? placed.length : length;
   setGripper(placedAt(nearest, outline, { length: kept, before: angle }));
-  notePlaced(target, { point: nearest, length: kept });
+  target.placed = { point: nearest, grasp: JSON.stringify(target.marks.grasp, round), length: kept };
   return isBeside;
 }
 
@@ -221,7 +215,8 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
       if (isStroke && target.marks.box) snapBox(target.marks);
-      const hasMoved = commit({ base, strokes, box: isStroke ? box : null });
+      const hasMoved = isStroke && followOutline(target);
+      commit({ base, strokes, box: isStroke ? box : null });
       const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!isStroke) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
@@ -323,7 +318,7 @@ export function turnToFit() {
   const moved = Math.max(norm(sub(fitted.center, gripper.center)), Math.abs(fitted.width - gripper.width));
   if (Math.abs(Math.sin(fitted.angle - gripper.angle)) < MIN_TURN && moved < MIN_MOVE_PX) return toast("The gripper already fits.");
   setGripper(fitted);
-  notePlaced(image(), { point: fitted.center, length: gripper.length });
+  image().placed = { point: fitted.center, grasp: JSON.stringify(marks().grasp, round), length: gripper.length };
   commit();
 }
 

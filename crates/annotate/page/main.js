@@ -6,7 +6,6 @@ import { openFolder, renderFolder } from "./folder.js";
 import "./gestures.js";
 import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
-import "./narrow.js";
 import { renderOverlay } from "./overlay.js";
 import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";

@@ -21,6 +21,15 @@ const DOES = {
 };
 const ORDER = ["C", "A", "B", "D", "S"];
 
+/** On a narrow screen, “In” and “Out” are in the toolbar above the photo: the panel is below it. */
+const narrow = matchMedia("(max-width: 860px)");
+function placeStrokeTools() {
+  if (narrow.matches) by("zoom-tools").before(by("in-out"));
+  else by("do-outline").append(by("in-out"));
+}
+narrow.addEventListener("change", placeStrokeTools);
+placeStrokeTools();
+
 for (const button of document.querySelectorAll("button[data-tool]")) {
   button.addEventListener("click", () => setTool(button.dataset.tool));
 }

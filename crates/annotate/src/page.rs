@@ -27,7 +27,6 @@ const FILES: &[(&str, &str, &str)] = &[
     ("live.js", SCRIPT, include_str!("../page/live.js")),
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
-    ("narrow.js", SCRIPT, include_str!("../page/narrow.js")),
     ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),
     ("part_settings.js", SCRIPT, include_str!("../page/part_settings.js")),
     ("region.js", SCRIPT, include_str!("../page/region.js")),
