@@ -202,9 +202,9 @@ function takenAt(target, from) {
   const [t, s] = [along, quarter(along)].map((axis) => dot(arm, axis));
   const isBetween = Math.abs(t) <= gripper.length / 2 && Math.abs(s) <= gripper.width / 2;
   const { scale } = state.view;
-  const isNear = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
+  const near = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
   const end = gripper.length / 2 + KNOB_PX / scale;
-  const handle = isNear(0) || (isBetween && Math.abs(s) < distanceTo(outline, from)) ? "body" : isNear(-end) ? "end=start" : isNear(end) && "end=end";
+  const handle = near(0) || (isBetween && Math.abs(s) < distanceTo(outline, from)) ? "body" : near(-end) ? "end=start" : near(end) && "end=end";
   return handle ? overlay.querySelector(`[data-kind=grasp][data-${handle}]`) : taken;
 }
 

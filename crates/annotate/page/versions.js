@@ -29,7 +29,7 @@ export function figuresText({ figures, negatives }) {
   if (!figures) return "";
   const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees, others_in_photo: others } = figures;
   const off = error ? `, off by ${error[0].toFixed(1)}\u00a0${error[1]} and ${degrees.toFixed(1)}° (median)` : "";
-  const more = others ? ` ${others} further parts of this kind in the photo were removed from the samples.` : "";
+  const more = others ? ` ${others} further parts in the photo were removed from the samples.` : "";
   const said = negatives ? ` It refuses ${negatives.refused} of your ${negatives.pictures} picture${negatives.pictures === 1 ? "" : "s"} without the part.` : "";
   return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0% interval: ${Math.round(100 * low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]}.${more}${said}`;
 }
