@@ -83,7 +83,7 @@ impl Source {
         Ok(bytes)
     }
 
-    /// Passes a span piece by piece, at most `piece` bytes at a time.
+    /// Passes a span to `take` in pieces of at most `piece` bytes.
     pub(crate) fn read_pieces(
         &mut self,
         span: Span,

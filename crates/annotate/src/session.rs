@@ -217,7 +217,7 @@ impl Session {
         state.save_project()
     }
 
-    /// Uses a version of the model for the pictures to try, and as the file under the model's own name.
+    /// Makes a version the model in use, and copies it to the model's file.
     ///
     /// # Errors
     /// Unknown version, its file cannot be read, a file cannot be written, or a teaching is running.
@@ -238,8 +238,8 @@ impl Session {
     /// picture.
     ///
     /// # Errors
-    /// The region is invalid, the model cannot search it or, without a model, the marked part does not fit into it; a
-    /// teaching is running, whose model has the region set at its start; the project cannot be written.
+    /// The region is invalid, the model cannot search it, or (without a model) the marked part does not fit into it; a
+    /// teaching is running; the project cannot be written.
     pub fn set_region(&self, region: Option<Region>) -> Result<()> {
         self.teaching.check_idle()?;
         if let Some(region) = &region {
@@ -294,7 +294,7 @@ impl Session {
     pub fn take_photo(&self, number: u64) -> Result<ImageView> {
         let frame = self.live_desk()?.photo(number)?;
         let bytes = png(&frame)?;
-        // Held until the photo is written, so that its name is taken when the next one is chosen.
+        // The lock is held until the photo is written, so that the next photo gets another name.
         let mut state = self.state();
         let path = self.next_photo()?;
         sdg_files::write_atomically(&path, &bytes)?;

@@ -126,7 +126,7 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface is searched within this number of standard deviations of the expected height.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Minimum and maximum distance from the expected height at which the surface is searched, in metres.
+/// Smallest and largest half width of that range, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
@@ -264,7 +264,7 @@ impl<P> ModelFinder<P> {
             None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
         };
         let pose = found.pose?;
-        // Walls shift a pose because of the part's relief, equally in both pictures: that error is not noise.
+        // The part's visible side walls shift its pose equally in all pictures: this error is not noise.
         let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
         Some(Sighting {
             camera_m: place.camera.world_from_camera.translation.vector.into(),

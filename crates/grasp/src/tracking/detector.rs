@@ -42,7 +42,7 @@ impl PartDetector {
         }
     }
 
-    /// Width and height of the frame of reference.
+    /// Width and height of the searched image: the picture or the plan view.
     pub(super) fn frame_size(&self, picture: &RgbImage) -> [u32; 2] {
         match self {
             Self::Picture(_) => [picture.width(), picture.height()],
@@ -77,8 +77,7 @@ impl PartDetector {
         }
     }
 
-    /// A detection of the frame of reference in pixels of the picture, and in metres; `None` if the camera does not
-    /// show it.
+    /// Converts a detection to pixels of the picture and to metres; `None` if the camera does not show it.
     pub(super) fn output(&self, detection: GraspDetection) -> Option<(GraspDetection, Option<PlanarPose>)> {
         match self {
             Self::Picture(_) => Some((detection, None)),

@@ -95,10 +95,9 @@ pub struct PlacingReport {
     pub grasp: GraspReport,
     /// The outcome.
     pub outcome: PlacingOutcome,
-    /// The contacts each time the part was put down, and of compliant approaches after the first.
+    /// The contacts of all placements, and of the compliant approaches of repeated grasps.
     pub touched: Vec<Touched>,
-    /// The part's offset from its place (for a bin, from its centre) by each picture; empty if the part was not
-    /// detected in a bin.
+    /// The part's offset from its place (from a bin's centre), one for each picture in which the part was detected.
     pub errors: Vec<PlaceOffset>,
 }
 

@@ -29,7 +29,7 @@ pub(crate) fn share(share: Share, tone: Tone) -> Cell {
     }
 }
 
-/// A number, or an empty cell.
+/// A number, or a dash.
 pub(crate) fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or(Cell::missing(), |value| Cell::number(value, decimals))
 }
