@@ -116,7 +116,7 @@ fn wrong_calls_are_refused_in_one_line() {
     refused(&at("huge.npy"), "a.json", &with_image, 1, &["huge.npy", "expected 64000000000 bytes"]);
 }
 
-/// A header that announces four thousand million numbers, without the data.
+/// A header that announces sixteen thousand million numbers, without the data.
 fn huge_header() -> Vec<u8> {
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4000000000, 4), }\n";
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -127,7 +127,7 @@ fn huge_header() -> Vec<u8> {
 
 #[test]
 fn every_format_is_a_demonstration() {
-    // Row 3 of OpenDR's file has the marks of the part rotated by 180°; model S learns the photo at these marks, too.
+    // Row 3 of OpenDR's file has the marks of the part rotated by 180°; `augment` accepts these, too.
     let folder = tempfile::tempdir().unwrap();
     let numbered = folder.path().join("3.png");
     fs::copy(shipped("fuel_line", "image.png"), &numbered).unwrap();

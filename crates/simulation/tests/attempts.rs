@@ -103,7 +103,7 @@ fn a_bar_of_known_pose_is_lifted() {
         let mut looking = Looking::new(|| Some(target));
         let report = cell.run_attempt(&mut looking, &AttemptConfig::default(), seed).unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held, "bar at ({x}, {y}) turned {yaw_rad}");
-        // Lifted by 0.45 m, or by the smallest allowed height if the arm's reach ends.
+        // Lifted by 0.45 m, or by at least 0.25 m if the arm cannot reach higher.
         assert!(report.object_height_m.unwrap() > 0.2, "{:?}", report.object_height_m);
         assert_eq!((looking.views.len(), report.targets.len()), (2, 2));
         // The second picture is taken from above the part.

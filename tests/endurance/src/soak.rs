@@ -65,7 +65,7 @@ impl Held {
     }
 }
 
-/// The state of a process after each unit: a frame, a session, a disconnection.
+/// The state of a process after each unit: a frame or a session.
 #[derive(Debug, Default)]
 struct Course(Vec<Held>);
 
@@ -254,7 +254,7 @@ fn connection(
     )?;
     for _ in 0..each {
         let frame = &frames[*sent % frames.len()];
-        // The boundary after a frame marks its end.
+        // Content-Length marks the end of a frame; the next boundary comes with the next frame.
         let length = frame.len();
         write!(stream, "--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {length}\r\n\r\n")?;
         stream.write_all(frame)?;

@@ -1,4 +1,4 @@
-//! Ways to store the marks of a scene without loss.
+//! Ways to store the marks of a scene without loss of the grasp.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
