@@ -10,8 +10,8 @@ use crate::watch::Watch;
 
 /// An arm with a hand, simulated or real.
 ///
-/// Calls except [`Arm::start_hand`] block until the requested action is done. After an error the arm is at rest, or the
-/// robot itself brings it to rest.
+/// Calls except [`Arm::start_hand`] block until the requested action is done. After an error the arm has stopped, or
+/// its own controller is stopping it.
 pub trait Arm {
     /// Links, limits and hand of the arm.
     fn geometry(&self) -> &ArmGeometry;
