@@ -84,7 +84,7 @@ film: build ## Makes the pictures of the front page, the tour and the gallery, d
 walk: build ## Times the way from a photo to a tried model, through the page in Chromium (SETS="FOLDER …")
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	SDG_WALK="$(SETS)" $(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --nocapture walk::
+	SDG_WALK="$(abspath $(SETS))" $(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --nocapture walk::
 
 # A run without TUNED=1 measures the reported side: record it in docs/decisions/025-acceptance.md.
 MODELS ?= S

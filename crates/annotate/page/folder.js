@@ -1,15 +1,14 @@
 // The other pictures of the project's folder, and photos from elsewhere, added one by one.
 
 import { api } from "./api.js";
-import { button } from "./buttons.js";
 import { adopt } from "./editing.js";
+import { button, by } from "./elements.js";
 import { changed, isLive, state } from "./store.js";
 import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 import { byName } from "./words.js";
 
-const by = (id) => document.getElementById(id);
 const dialog = by("folder");
 /** Role of a chosen picture: photo or try. */
 let wanted = "photo";

@@ -1,5 +1,6 @@
 // Gestures of mouse, pen and fingers on the photo.
 
+import { by } from "./elements.js";
 import { add, direction, distanceTo, distanceToEdge, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
@@ -7,8 +8,8 @@ import { KNOB_PX, REACH_PX } from "./overlay.js";
 import { abandonRegion, drawingRegion, isChoosingRegion } from "./region.js";
 import { pan, toPhoto, zoom } from "./view.js";
 
-const stage = document.getElementById("stage");
-const overlay = document.getElementById("overlay");
+const stage = by("stage");
+const overlay = by("overlay");
 /** A pointer that moves less than this has clicked. */
 const CLICK_PX = 5;
 /** The jaws' length changes only if an end's knob is dragged by at least this much outwards or inwards, so that turning alone does not change it. */

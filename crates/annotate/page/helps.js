@@ -4,7 +4,7 @@
 // done with model S only, which is taught in a second. Only the user knows whether the part is where it was refused.
 
 import { api } from "./api.js";
-import { button } from "./buttons.js";
+import { button, by } from "./elements.js";
 import { isFound, isLive, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
@@ -16,7 +16,6 @@ const MAX_OTHERS = 8;
 /** After this time no further candidate is begun. */
 const MAX_MS = 6000;
 
-const by = (id) => document.getElementById(id);
 const best = ({ detections }) => detections[0]?.score ?? 0;
 
 /** The candidates and other pictures; null if there are none, or not yet. */

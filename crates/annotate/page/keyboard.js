@@ -1,6 +1,7 @@
 // Shortcuts. In fields, keys are for text.
 
 import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, strokeOutline, undo } from "./editing.js";
+import { by } from "./elements.js";
 import { boundsOf, boxPolygon } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
@@ -10,8 +11,8 @@ import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 
 const DEGREE = Math.PI / 180;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-const help = document.getElementById("help");
-const overlay = document.getElementById("overlay");
+const help = by("help");
+const overlay = by("overlay");
 
 /** Creates the chosen mark without a pointer, in the middle of the view; it can be moved from there. */
 function putInTheMiddle() {

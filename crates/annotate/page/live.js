@@ -1,8 +1,8 @@
 // The camera: its newest picture on the stage, photos taken from it, and the taught model applied to it continuously.
 
 import { api } from "./api.js";
-import { offBecause } from "./buttons.js";
 import { adopt } from "./editing.js";
+import { by, offBecause } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -31,7 +31,6 @@ const FAULTS = {
   lost: "No answer",
 };
 
-const by = (id) => document.getElementById(id);
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const isPaused = () => state.tab === "try" && state.live.paused;
 

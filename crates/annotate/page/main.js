@@ -2,10 +2,12 @@
 
 import { api, belongTo } from "./api.js";
 import { adopt } from "./editing.js";
+import { by } from "./elements.js";
 import { openFolder, renderFolder } from "./folder.js";
 import "./gestures.js";
 import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
+import "./narrow.js";
 import { renderOverlay } from "./overlay.js";
 import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";
@@ -21,7 +23,6 @@ import { renderVersions } from "./versions.js";
 import { fitOrPart } from "./keyboard.js";
 import { renderView, zoom } from "./view.js";
 
-const by = (id) => document.getElementById(id);
 
 /** The theme is stored in the browser, if it allows that. */
 const THEMES = ["auto", "light", "dark"];

@@ -1,14 +1,13 @@
 // The first step's panel: the next mark, its numbers, problems, and the models that the marks suffice for.
 
 import { api } from "./api.js";
-import { offBecause } from "./buttons.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
+import { by, offBecause } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
 import { toast } from "./toast.js";
 
-const by = (id) => document.getElementById(id);
 const label = by("label");
 const inputs = { angle: by("grasp-angle"), width: by("grasp-width"), length: by("grasp-length") };
 
@@ -20,15 +19,6 @@ const DOES = {
   S: "shape",
 };
 const ORDER = ["C", "A", "B", "D", "S"];
-
-/** On a narrow screen, “In” and “Out” are in the toolbar above the photo: the panel is below it. */
-const narrow = matchMedia("(max-width: 860px)");
-function placeStrokeTools() {
-  if (narrow.matches) by("zoom-tools").before(by("in-out"));
-  else by("do-outline").append(by("in-out"));
-}
-narrow.addEventListener("change", placeStrokeTools);
-placeStrokeTools();
 
 for (const button of document.querySelectorAll("button[data-tool]")) {
   button.addEventListener("click", () => setTool(button.dataset.tool));
@@ -184,7 +174,7 @@ function hint() {
   const { box, grasp, outline } = marks();
   if (state.proposing) return "Detecting the outline…";
   if (state.tool === "box") return "Drag a box around the whole part";
-  if (state.tool === "grasp") return "Click the part where the gripper should hold it";
+  if (state.tool === "grasp") return "Click where the gripper should hold the part";
   if (state.tool === "outline") {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";

@@ -1,12 +1,13 @@
 // The marks drawn over the photo. Elements are kept between frames, so that a focused handle keeps the focus.
 
+import { by } from "./elements.js";
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
 import { strokesOf } from "./editing.js";
 import { image, isAccepted, isFound, isLive, isMarking, marks, state, touchedBy, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-const overlay = document.getElementById("overlay");
+const overlay = by("overlay");
 /** Radius around a handle in which a pointer grabs it: larger for fingers. */
 export const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 /** Distance between the end of the line and its knob, so that knob and jaws stay apart however small the gripper is. */

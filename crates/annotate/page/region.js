@@ -1,13 +1,12 @@
 // The searched region of the pictures: shown as a frame, set by dragging on the picture or by four numbers.
 
 import { api } from "./api.js";
-import { offBecause } from "./buttons.js";
+import { by, offBecause } from "./elements.js";
 import { clamp } from "./geometry.js";
 import { changed, isLive, isRunning, searchAgain, state, trialPicture } from "./store.js";
 import { toast } from "./toast.js";
 import { toPhoto, toScreen } from "./view.js";
 
-const by = (id) => document.getElementById(id);
 const SIDES = ["x", "y", "width", "height"];
 /** A region with a shorter side was drawn by mistake. */
 const MIN_SIDE_PX = 8;

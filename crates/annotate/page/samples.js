@@ -1,15 +1,15 @@
 // The second step: a sheet of samples made from the marks.
 
 import { api } from "./api.js";
-import { offBecause } from "./buttons.js";
+import { by, offBecause } from "./elements.js";
 import { image, isAnyMarked, state } from "./store.js";
 
 const COUNT = 12;
-const sheet = document.getElementById("sheet");
-const problem = document.getElementById("samples-error");
+const sheet = by("sheet");
+const problem = by("samples-error");
 let first = 0;
 
-document.getElementById("other-samples").addEventListener("click", () => {
+by("other-samples").addEventListener("click", () => {
   first += COUNT;
   renderSamples();
 });
@@ -18,7 +18,7 @@ document.getElementById("other-samples").addEventListener("click", () => {
 export function renderSamples() {
   if (state.tab !== "samples") return;
   const isBoxed = image() && (image().marks.box || image().marks.outline);
-  offBecause(document.getElementById("other-samples"), !isBoxed && "Draw a box around the part first");
+  offBecause(by("other-samples"), !isBoxed && "Draw a box around the part first");
   offBecause(document.querySelector("#panel-samples [data-next=teach]"), !isAnyMarked() && "Mark box and grasp on a photo first");
   if (!image()) {
     problem.hidden = false;

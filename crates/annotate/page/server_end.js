@@ -3,12 +3,13 @@
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, save } from "./editing.js";
+import { by } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
 
-const banner = document.getElementById("lost");
+const banner = by("lost");
 /** Intervals of checking the server: while it answers, and while it does not. */
 const BEAT_MS = 3000;
 const RETRY_MS = 1500;
@@ -116,7 +117,7 @@ export function renderUnsaved() {
   const [first] = unsaved;
   const names = listText(unsaved.map(({ name }) => name), 3);
   const text = first ? `Not saved: the marks on ${names} (${first.saved.why}). They stay on this page; saving is tried again until it succeeds.` : "";
-  const line = document.getElementById("unsaved");
+  const line = by("unsaved");
   line.hidden = !first;
   if (line.textContent === text) return;
   if (!first && !isLost() && !state.images.some(isUnsaved)) toast("All marks are saved now.");

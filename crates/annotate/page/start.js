@@ -1,9 +1,8 @@
 // Without a project: opens a recent one, or creates a new one from a photo.
 
 import { api } from "./api.js";
-import { button } from "./buttons.js";
+import { button, by } from "./elements.js";
 
-const by = (id) => document.getElementById(id);
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** Names that cameras give to any picture. */
 const ANY_NAME = /^(photo|image|picture|img|pic|dscn?f?|pxl|p|demo|frame|screenshot)?[\W\d_]*$/i;

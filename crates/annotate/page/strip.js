@@ -2,13 +2,14 @@
 
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
+import { by } from "./elements.js";
 import { toast } from "./toast.js";
 import { changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
 import { replacePicture, show } from "./view.js";
 
-const strip = document.getElementById("strip");
-const empty = document.getElementById("empty");
-const photo = document.getElementById("photo");
+const strip = by("strip");
+const empty = by("empty");
+const photo = by("photo");
 
 /** Opens another photo of the part for marking. */
 export function openImage(index) {

@@ -1,11 +1,12 @@
 // The four steps, as tabs.
 
 import { api } from "./api.js";
+import { by } from "./elements.js";
 import { isMarked, showCurrent } from "./strip.js";
 import { changed, isLive, state } from "./store.js";
 
 const NAMES = ["mark", "samples", "teach", "try"];
-const tab = (name) => document.getElementById(`tab-${name}`);
+const tab = (name) => by(`tab-${name}`);
 
 export function openTab(name) {
   if (state.tab === name) return;
@@ -58,11 +59,11 @@ export function renderTabs() {
     tab(name).setAttribute("aria-selected", String(open));
     tab(name).tabIndex = open ? 0 : -1;
     tab(name).classList.toggle("done", Boolean(done[name]) && !open);
-    document.getElementById(`panel-${name}`).hidden = !open;
+    by(`panel-${name}`).hidden = !open;
   }
   document.querySelector("main").dataset.tab = state.tab;
   const samples = state.tab === "samples";
-  document.getElementById("stage").hidden = samples;
-  document.getElementById("tools").hidden = samples;
-  document.getElementById("sheet").hidden = !samples;
+  by("stage").hidden = samples;
+  by("tools").hidden = samples;
+  by("sheet").hidden = !samples;
 }

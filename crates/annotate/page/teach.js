@@ -1,7 +1,7 @@
 // The third step: teaching, and its progress.
 
 import { api } from "./api.js";
-import { offBecause } from "./buttons.js";
+import { by, offBecause } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
 import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
@@ -9,7 +9,6 @@ import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
 import { percent, seconds } from "./words.js";
 
-const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
   ["C", "Keypoints (recommended)", "The best all-round. Half a minute to four minutes."],

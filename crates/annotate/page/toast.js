@@ -1,5 +1,7 @@
 // Short notes that disappear by themselves.
 
+import { by } from "./elements.js";
+
 const SHOWN_MS = 3500;
 /** Notes with a button are shown longer: they must be read and reached. */
 const SHOWN_WITH_BUTTON_MS = 12000;
@@ -8,7 +10,7 @@ const SHOWN_WITH_BUTTON_MS = 12000;
 export function toast(text, action = null) {
   const note = document.createElement("p");
   note.textContent = text;
-  document.getElementById("toasts").append(note);
+  by("toasts").append(note);
   if (action) {
     const button = Object.assign(document.createElement("button"), { textContent: action.text });
     button.addEventListener("click", () => {

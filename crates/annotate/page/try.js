@@ -1,7 +1,7 @@
 // The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
 import { api } from "./api.js";
-import { button } from "./buttons.js";
+import { button, by } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
@@ -19,7 +19,6 @@ import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 import { byName } from "./words.js";
 
-const by = (id) => document.getElementById(id);
 const stage = by("stage");
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** With fewer pictures the order does not matter. */

@@ -1,14 +1,13 @@
 // The models taught so far: the quality of each, the one in use, and comparisons.
 
 import { api } from "./api.js";
-import { button } from "./buttons.js";
 import { changeOf, changesText } from "./changes.js";
+import { button, by } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
 import { changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
 import { percent } from "./words.js";
 
-const by = (id) => document.getElementById(id);
 const list = by("version-list");
 /** A model whose found share is lower by this or more is worse. */
 const MIN_DROP = 0.1;

@@ -1,5 +1,6 @@
 // The visible region of the photo: screen = photo · scale + [x, y].
 
+import { by } from "./elements.js";
 import { clamp } from "./geometry.js";
 import { changed, state } from "./store.js";
 
@@ -10,8 +11,8 @@ const MARGIN_PX = 24;
 /** From this scale on, pixels are shown as squares. */
 const CRISP_FROM = 4;
 
-const stage = document.getElementById("stage");
-const photo = document.getElementById("photo");
+const stage = by("stage");
+const photo = by("photo");
 
 /** Width and height of what is shown. */
 let shown = [1, 1];
@@ -100,8 +101,8 @@ export function renderView() {
   const { scale, x, y } = state.view;
   photo.style.transform = `translate(${x}px, ${y}px) scale(${scale})`;
   photo.classList.toggle("crisp", scale >= CRISP_FROM);
-  document.getElementById("zoom-tools").hidden = photo.hidden;
-  document.getElementById("zoom").textContent = `${Math.round(scale * 100)} %`;
+  by("zoom-tools").hidden = photo.hidden;
+  by("zoom").textContent = `${Math.round(scale * 100)} %`;
 }
 
 /** The stage's last size. */

@@ -77,7 +77,8 @@ fn visible_text(page: &Page) -> String {
 
 fn demonstration_of(set: &Path) -> (PathBuf, Annotation) {
     let photo = ["jpg", "png"].map(|extension| set.join("demo").with_extension(extension));
-    let photo = photo.into_iter().find(|photo| photo.exists()).unwrap();
+    let photo = photo.into_iter().find(|photo| photo.exists());
+    let photo = photo.unwrap_or_else(|| panic!("no demo.jpg or demo.png in {}", set.display()));
     let size = image::image_dimensions(&photo).unwrap();
     let facts =
         ImageFacts { width: size.0, height: size.1, file_name: photo.file_name().and_then(|name| name.to_str()) };
@@ -158,7 +159,8 @@ fn walk(set: &Path, symmetry: &str) -> f64 {
 #[test]
 #[ignore = "make walk: needs Chromium, and photographs that are not in this repository"]
 fn from_a_photograph_to_a_tried_model_in_three_minutes() {
-    let sets = std::env::var("SDG_WALK").unwrap();
+    let sets = std::env::var("SDG_WALK").unwrap_or_default();
+    assert!(!sets.trim().is_empty(), "no set to walk through: make walk SETS=\"FOLDER …\"");
     let mut slowest = 0.0f64;
     for set in sets.split_whitespace() {
         // A folder of parts that look the same when rotated: FOLDER=2.

@@ -166,7 +166,7 @@ fn see_samples(page: &Page) {
     let loaded = "return [...document.querySelectorAll('#sheet img')].filter((i) => i.naturalWidth).length === 12";
     page.wait_for("twelve samples", loaded);
     let about = page.text("#panel-samples");
-    assert!(about.contains("Further parts of this kind in the photo are still visible here"), "{about}");
+    assert!(about.contains("Unmarked parts of this kind are removed later"), "{about}");
     page.screenshot("4-samples");
     page.assert_accessible("samples");
     page.click("#panel-samples [data-next=teach]");

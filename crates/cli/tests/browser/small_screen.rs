@@ -3,6 +3,8 @@
 use serde_json::json;
 
 use super::page::{HOLD, Page};
+use super::photo_to_grasp::patiently;
+use super::tried::{add, photo, taught};
 
 const STEPS: [&str; 4] = ["mark", "samples", "teach", "try"];
 
@@ -14,6 +16,41 @@ const OVERLAPS: &str = "const items = [...document.querySelectorAll('.todo li')]
     return items.filter(([, e]) => e.matches('[data-clear]')).flatMap(([li, e]) => items
         .filter(([of, other]) => of === li && other !== e && meets(rect(e), rect(other)))
         .map(([, other]) => `${e.innerText} ${other.innerText}`))";
+
+/// Pairs of controls that Tab reaches in another order than they are seen: from top to bottom, then from left to right.
+/// The marks on the photo are left out.
+const OUT_OF_ORDER: &str = "const all = document.querySelectorAll(arguments[0]);
+    const controls = [...all].flatMap((e) => [...e.querySelectorAll('button, input, select, summary, [tabindex]')])
+        .filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex >= 0 && !e.closest('#overlay, #toasts, dialog'));
+    const name = (e) => e.id || e.innerText;
+    const ahead = controls.filter((e) => e.tabIndex > 0).map(name);
+    const isAbove = (a, b) => Math.abs(a.top + a.bottom - b.top - b.bottom) < 8 ? a.left < b.left : a.bottom <= b.top + 1;
+    const rect = (e) => e.getBoundingClientRect();
+    const pairs = controls.slice(1).map((e, i) => [controls[i], e]);
+    const wrong = pairs.filter(([a, b]) => isAbove(rect(b), rect(a))).map(([a, b]) => `${name(a)}, ${name(b)}`);
+    return [controls.length > 1, ahead.concat(wrong)]";
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn tab_follows_the_order_that_is_seen() {
+    let page = taught();
+    add(&page, &[("other.png".to_owned(), photo())]);
+    patiently(&page, "a detection", "return document.querySelector('#found .found') !== null");
+    // A teaching's button sticks to the lower edge of higher windows.
+    for (width, height, within) in [(390, 700, "body"), (1280, 700, ".top"), (1280, 700, ".panel"), (390, 700, "body")]
+    {
+        page.browser.emulate(width, height, false).unwrap();
+        for step in STEPS {
+            page.click(&format!("#tab-{step}"));
+            page.settle_frames();
+            let order = page.browser.run(OUT_OF_ORDER, &[json!(within)]).unwrap();
+            assert_eq!(order[1], json!([]), "{step}, {within} at {width} px");
+            assert_eq!(order[0], json!(true), "{step}, {within} at {width} px: there are controls");
+        }
+    }
+    page.assert_accessible("the order on a phone");
+    page.assert_quiet();
+}
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]

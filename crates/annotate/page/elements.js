@@ -1,4 +1,6 @@
-// Creates buttons, and disables them with a reason.
+// Finds elements, creates buttons, and disables controls with a reason.
+
+export const by = (id) => document.getElementById(id);
 
 /** A button with this text. */
 export function button(text, action, classes = "") {
