@@ -219,7 +219,7 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       commit({ base, strokes, box: isStroke ? box : null });
       const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
-      if (!isStroke) toast("Found an outline. Where it is wrong, draw “In” or “Out”.");
+      if (!isStroke) toast("Outline found. If wrong, draw “In” or “Out”.");
       else if (!last.isInside && isWithin(middle, outline)) {
         toast("This place is inside the part. An outline is a single line without holes; a hole does no harm.");
       } else if (last.isInside && !isWithin(middle, outline)) {

@@ -109,7 +109,7 @@ export async function watch() {
 /** What a model is or was taught from, in words. */
 function materialText(photos, negatives) {
   const without = negatives ? ` and ${negatives === 1 ? "a picture" : `${negatives} pictures`} without it` : "";
-  return `From ${photos === 1 ? "the marked photo" : `${photos} marked photos`} of “${state.label}”${without}.`;
+  return `From ${photos === 1 ? "the marked photo" : `${photos} marked photos`}${without}.`;
 }
 
 /** The progress of the teaching, in words. */
