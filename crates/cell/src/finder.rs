@@ -55,7 +55,7 @@ impl<A: Arm> Pictures<A> for LivePictures {
                 Ok(None) if self.0.has_ended() => return Err(failed("the camera has no more pictures".to_owned())),
                 Ok(None) => {
                     let secs = MAX_WAIT.as_secs();
-                    return Err(failed(format!("no picture for {secs} s that was taken after the arm stopped")));
+                    return Err(failed(format!("no picture taken after the arm stopped arrived within {secs} s")));
                 }
                 Err(error) if error.is_passing() && called.elapsed() < MAX_WAIT => continue,
                 Err(error) => return Err(failed(error.to_string())),

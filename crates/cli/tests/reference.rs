@@ -10,11 +10,13 @@ use std::path::Path;
 
 use clap::{Arg, Command};
 
+const MAX_COLUMNS: usize = 100;
+
 /// The page's text above the commands.
 const HEAD: &str = "# Commands and options
 
-Every command with its arguments and options, written by a test from the program's own definition. `sdg COMMAND --help`
-prints the same. Common rules and output: [the command line](command-line.md).
+Every command with its arguments and options, written by a test from the program's own definition.
+`sdg COMMAND --help` prints the same. Common rules and output: [the command line](command-line.md).
 ";
 
 #[test]
@@ -65,9 +67,8 @@ fn write_verb(text: &mut String, command: &Command, parents: &str) {
         if let Some(heading) = heading {
             writeln!(text, "{heading}:\n").unwrap();
         }
-        text.push_str("| argument or option | meaning |\n|---|---|\n");
         for arg in shown().filter(|arg| arg.get_help_heading() == heading) {
-            writeln!(text, "| {} | {} |", signature(arg), meaning(arg)).unwrap();
+            text.push_str(&item(&signature(arg), &meaning(arg)));
         }
         text.push('\n');
     }
@@ -97,13 +98,29 @@ fn signature(arg: &Arg) -> String {
     };
     let several =
         if takes_value && arg.get_num_args().is_some_and(|number| number.max_values() > 1) { " …" } else { "" };
-    format!("`{dashes}{values}").trim_end().replace('|', "\\|") + several + "`"
+    format!("`{dashes}{values}").trim_end().to_owned() + several + "`"
+}
+
+/// An item of a list, wrapped at [`MAX_COLUMNS`]. A signature is not divided.
+fn item(signature: &str, meaning: &str) -> String {
+    let mut item = format!("- {signature}");
+    let mut columns = item.chars().count();
+    for word in ["–"].into_iter().chain(meaning.split(' ')) {
+        let width = word.chars().count();
+        if columns + 1 + width > MAX_COLUMNS {
+            item.push_str("\n ");
+            columns = 1;
+        }
+        write!(item, " {word}").unwrap();
+        columns += 1 + width;
+    }
+    item + "\n"
 }
 
 /// The help, the default, and the possible values.
 fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
-    let mut meaning = sentence(&in_markdown(&help)).replace('|', "\\|");
+    let mut meaning = sentence(&in_markdown(&help));
     if !arg.get_action().takes_values() {
         return meaning;
     }

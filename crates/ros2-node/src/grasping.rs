@@ -45,7 +45,7 @@ impl<A: Arm> Pictures<A> for TopicPictures {
     fn take(&mut self, _arm: &mut A) -> sdg_robot::Result<TakenPicture> {
         let picture = self.0.newer_than(SystemTime::now(), PICTURE_TIMEOUT).ok_or_else(|| {
             let secs = PICTURE_TIMEOUT.as_secs();
-            RobotError::Perception(format!("no picture for {secs} s that was taken after the arm stopped"))
+            RobotError::Perception(format!("no picture taken after the arm stopped arrived within {secs} s"))
         })?;
         let age = SystemTime::now().duration_since(picture.captured).unwrap_or_default();
         Ok(TakenPicture { picture: (*picture.picture).clone(), taken: Instant::now().checked_sub(age) })

@@ -193,7 +193,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             if let Some(size_m) = goal.bin_m {
                 return match inside(goal, &found.base_from_tcp, size_m) {
                     true => Ok(()),
-                    false => Err(fails(format!("the part lies beside the bin {}", told(&error)))),
+                    false => Err(fails(format!("the part lies beside the bin, {} from its centre", told(&error)))),
                 };
             }
             let is_within = |(distance_m, angle_rad): (f64, f64)| {
