@@ -50,7 +50,7 @@ typedef int32_t sdg_status;
 /* An invalid camera file; or a camera for a model that was taught without one. */
 #define SDG_ERROR_CAMERA 5
 
-/* A region that is not inside the picture. */
+/* A region that is empty, not inside the picture, or too small for the part. */
 #define SDG_ERROR_REGION 6
 
 /* A photo or marks unsuitable for teaching. */

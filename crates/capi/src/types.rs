@@ -24,7 +24,7 @@ pub const SDG_ERROR_MODEL_FILE: sdg_status = 3;
 pub const SDG_ERROR_PICTURE: sdg_status = 4;
 /// An invalid camera file; or a camera for a model that was taught without one.
 pub const SDG_ERROR_CAMERA: sdg_status = 5;
-/// A region that is not inside the picture.
+/// A region that is empty, not inside the picture, or too small for the part.
 pub const SDG_ERROR_REGION: sdg_status = 6;
 /// A photo or marks unsuitable for teaching.
 pub const SDG_ERROR_TEACHING: sdg_status = 7;

@@ -1,5 +1,5 @@
 //! Measures the timing of a client: `loop_times HOST [SECONDS]` swings a joint by 0.1 rad and prints, as one JSON
-//! object, the client's answer times and the robot's number of answered cycles.
+//! object, the client's answer times and the robot's rate of commands received in time.
 
 use std::ops::ControlFlow;
 

@@ -274,7 +274,7 @@ fn states_are_counted_only_while_a_client_is_connected() {
 fn a_position_that_is_no_number_stops_the_robot() {
     let server = serve();
     let client = Client::in_motion(&server);
-    // A state is answered repeatedly until a command arrives in its own cycle, first with READY, then with NaN.
+    // States are answered until a command arrives in its own cycle, first with READY, then with NaN.
     for q in [READY, [f64::NAN; 7]] {
         let begin = server.statistics().num_commands;
         while server.statistics().num_commands == begin {

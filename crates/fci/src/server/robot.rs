@@ -52,8 +52,8 @@ pub struct RobotCore {
     pub(super) mode: RobotMode,
     pub(super) errors: RobotErrors,
     pub(super) reflex_reason: RobotErrors,
-    /// Whether the arm was in self-collision at the start of the motion; such a motion may continue, to leave the
-    /// collision.
+    /// Whether the arm has been in self-collision since the start of the motion; such a motion may continue, to leave
+    /// the collision.
     pub(super) began_in_self_collision: bool,
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,

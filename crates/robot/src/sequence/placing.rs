@@ -95,7 +95,7 @@ pub struct PlacingReport {
     pub grasp: GraspReport,
     /// The outcome.
     pub outcome: PlacingOutcome,
-    /// The contacts of all placements, and of the compliant approaches of repeated grasps.
+    /// The results of all placements' descents, and of the compliant approaches of repeated grasps.
     pub touched: Vec<Touched>,
     /// The part's offset from its place (from a bin's centre), one for each picture in which the part was detected.
     pub errors: Vec<PlaceOffset>,
