@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut secs, mut lowest_rate, mut sum_rates, mut num_rates) = (0.0, 1.0_f64, 0.0, 0);
     let result = robot.control_joint_positions(InternalController::JointImpedance, |state, step| {
         secs += step.as_secs_f64();
-        // The success rate covers the last 100 cycles; before that it covers fewer.
+        // The success rate covers the last 100 cycles, at the start fewer.
         if secs > 0.1 {
             lowest_rate = lowest_rate.min(state.control_command_success_rate);
             sum_rates += state.control_command_success_rate;

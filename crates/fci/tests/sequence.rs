@@ -244,7 +244,7 @@ fn the_server_takes_the_answer_to_its_present_state_alone() {
     client.udp.send_to(&Client::command(state.message_id - 1, READY), from).unwrap();
     wait_until("a late command is counted", || server.statistics().num_late > 0);
     assert_eq!(server.statistics().num_commands, 0);
-    // Commands from another program of this computer.
+    // Commands from another socket of this computer.
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
     for ahead in 0..20 {
         other.send_to(&Client::command(state.message_id + ahead, READY), from).unwrap();

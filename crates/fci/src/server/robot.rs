@@ -252,7 +252,7 @@ impl RobotCore {
                     }
                     return;
                 }
-                // The arm brakes in this cycle already: a reference that stays in place for one cycle is a jerk.
+                // The arm brakes in this cycle already: a reference that stays in place for one cycle would be a jerk.
                 Err(errors) => self.abort(errors),
             }
         }

@@ -7,8 +7,8 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// Duration of the shortest correction, s: ten times as long as the command losses after which corrections must
-/// converge. Longer corrections double this duration up to [`MAX_DOUBLINGS`] times.
+/// Duration of the shortest correction, s: ten times the longest loss of commands that the robot bridges. Longer
+/// corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
 /// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which

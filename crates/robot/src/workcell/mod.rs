@@ -34,8 +34,8 @@
 //!
 //! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
-//! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length] along z, capsule_mm = [diameter, length over all] along
-//!                                   # z, or plane_normal = [x, y, z], out of the solid
+//! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length] or capsule_mm = [diameter, length over all],
+//!                                   # along z; or plane_normal = [x, y, z], out of the solid
 //! at_mm = [500, 300, 150]           # centre, or a point of the plane, in the base frame
 //! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; optional
 //!
