@@ -82,7 +82,7 @@ impl Impedance {
         const MAX_MASS: f64 = 20.0;
         const MAX_INTEGRAL_PER_SEC: f64 = 10.0;
         const MAX_NULL_STIFFNESS: f64 = 100.0;
-        /// The robot stops above this.
+        /// Above this step the robot stops.
         const MAX_TORQUE_STEP_NM: f64 = 1.0;
         for idx in 0..6 {
             let is_turn = idx >= 3;

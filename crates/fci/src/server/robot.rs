@@ -286,7 +286,7 @@ impl RobotCore {
             // Braking would continue to press on the obstacle.
             self.references.joints = JointReference::at_rest(self.observation.q);
         } else if is_external {
-            // The arm is not at the reference, and must not move there.
+            // The arm is not at the reference, and must not move to it.
             self.follow_measurement();
         }
         if let Some(motion) = self.motion.take() {
