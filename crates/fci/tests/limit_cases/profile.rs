@@ -54,7 +54,7 @@ impl Profile {
         Self(shape.0.iter().map(|velocity| velocity * distance / length).collect())
     }
 
-    /// Stores values without conversion, such as torques.
+    /// Stores values that need no conversion, such as torques.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         Self(values.collect())
     }
