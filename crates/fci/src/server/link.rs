@@ -210,7 +210,7 @@ impl Link {
         }
     }
 
-    /// Accepts the waiting client when the first one has disconnected, or refuses it after [`HANDOVER`].
+    /// Accepts the waiting client when the other client has disconnected, or refuses it after [`HANDOVER`].
     fn admit_waiting(&mut self) {
         let Some(waiting) = self.waiting.take() else { return };
         if self.client.is_none() {
