@@ -50,13 +50,13 @@ typedef int32_t sdg_status;
 /* An invalid camera file; or a camera for a model that was taught without one. */
 #define SDG_ERROR_CAMERA 5
 
-/* A region that is not inside the picture. */
+/* A region that is empty, not inside the picture, or too small for the part. */
 #define SDG_ERROR_REGION 6
 
 /* A photo or marks unsuitable for teaching. */
 #define SDG_ERROR_TEACHING 7
 
-/* No part in the picture; only from sdg_detections_best. */
+/* No accepted detection; only from sdg_detections_best. */
 #define SDG_ERROR_NOTHING_TO_GRASP 8
 
 /* A handle that was freed, that never existed, or that is of another kind of object. */
@@ -225,9 +225,9 @@ typedef struct {
     double size;
     /* Left, upper, right and lower edge, in pixels. */
     double bounds[4];
-    /* Grasp point, in pixels. */
+    /* x of the grasp point, in pixels. */
     double grasp_x;
-    /* Grasp point, in pixels. */
+    /* y of the grasp point, in pixels. */
     double grasp_y;
     /* Direction from the first mark to the second, in (-180, 180], y down; the jaws close across it. */
     double grasp_angle_deg;

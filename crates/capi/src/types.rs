@@ -24,11 +24,11 @@ pub const SDG_ERROR_MODEL_FILE: sdg_status = 3;
 pub const SDG_ERROR_PICTURE: sdg_status = 4;
 /// An invalid camera file; or a camera for a model that was taught without one.
 pub const SDG_ERROR_CAMERA: sdg_status = 5;
-/// A region that is not inside the picture.
+/// A region that is empty, not inside the picture, or too small for the part.
 pub const SDG_ERROR_REGION: sdg_status = 6;
 /// A photo or marks unsuitable for teaching.
 pub const SDG_ERROR_TEACHING: sdg_status = 7;
-/// No part in the picture; only from sdg_detections_best.
+/// No accepted detection; only from sdg_detections_best.
 pub const SDG_ERROR_NOTHING_TO_GRASP: sdg_status = 8;
 /// A handle that was freed, that never existed, or that is of another kind of object.
 pub const SDG_ERROR_HANDLE: sdg_status = 9;
@@ -193,9 +193,9 @@ pub struct sdg_detection {
     pub size: f64,
     /// Left, upper, right and lower edge, in pixels.
     pub bounds: [f64; 4],
-    /// Grasp point, in pixels.
+    /// x of the grasp point, in pixels.
     pub grasp_x: f64,
-    /// Grasp point, in pixels.
+    /// y of the grasp point, in pixels.
     pub grasp_y: f64,
     /// Direction from the first mark to the second, in (-180, 180], y down; the jaws close across it.
     pub grasp_angle_deg: f64,

@@ -21,7 +21,7 @@ from test_equal import NAMES, as_printed, output, records_by_python, without_sec
 
 HERE = Path(__file__).resolve().parent
 INSTALLED = ROOT / "target" / "capi"
-# valgrind is 50 times slower.
+# Programs are 50 times slower under valgrind.
 VALGRIND = [
     *("valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full", "--show-leak-kinds=definite,indirect"),
     *("--errors-for-leak-kinds=definite,indirect", "--fair-sched=yes"),
@@ -118,7 +118,7 @@ def test_a_mat_of_opencv_has_the_same_pixels(
     assert [json.loads(line) for line in lines] == records_by_python(models["S"], pictures)
 
 
-# The first model without and the last with a camera: a network takes minutes.
+# The first model without a camera and the last with one, because each model with a network takes minutes.
 @pytest.mark.parametrize("name", [NAMES[0], NAMES[-1]])
 def test_valgrind_finds_no_error_and_no_leak(
     name: str, programs: Path, models: dict[str, Path], pixels: dict[str, Path]

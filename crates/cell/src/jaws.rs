@@ -8,8 +8,8 @@
 //!    └───╱─┘
 //!       ╱ neighbour  its outline reaches under a jaw
 //! ```
-//! The opening is the marked one. A hand that opens wider needs more space, and objects that the model was not taught
-//! are not detected: the absence of a warning is no guarantee.
+//! The opening is the part's marked width. A hand that opens wider needs more space, and objects that the model was not
+//! taught are not detected: the absence of a warning is no guarantee.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarGrasp, Polygon};

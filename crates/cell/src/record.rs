@@ -17,8 +17,7 @@ pub struct FoundRecord {
     pub pose: Option<PoseRecord>,
 }
 
-/// Pose of the grasp in metres and degrees. The position is within `sigma_mm`, and the rotation within `sigma_deg`,
-/// with a probability of 68 % each.
+/// Pose of the grasp in metres and degrees.
 #[derive(Debug, Clone, Serialize)]
 pub struct PoseRecord {
     /// The frame of the pose, as named in the camera file.

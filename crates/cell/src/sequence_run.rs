@@ -13,7 +13,7 @@ pub struct Ended {
     pub failed: Option<(GraspStep, String)>,
     /// Offset of the placed part from its place, measured in the last picture; `None` without a place or a measurement.
     pub beside: Option<PlaceOffset>,
-    /// The contact at each placing.
+    /// The results of the compliant descents of placing and of repeated grasps.
     pub touched: Vec<Touched>,
 }
 

@@ -22,7 +22,7 @@ const SAMPLE_M: f64 = 0.0006;
 const WINDOWS_APART_M: f64 = 0.004;
 /// Minimum and maximum distance of a window from the outline, in metres.
 const WINDOW_DISTANCE_M: [f64; 2] = [0.002, 0.040];
-/// Step between the tested heights, in metres: half a pixel of disparity.
+/// Step between the tested heights, in metres: about half a pixel of disparity.
 const STEP_M: f64 = 0.0005;
 /// Minimum correlation of both pictures at a window's height.
 const MIN_CORRELATION: f64 = 0.8;

@@ -1,5 +1,5 @@
 //! Measures the timing of a client: `loop_times HOST [SECONDS]` swings a joint by 0.1 rad and prints, as one JSON
-//! object, the client's answer times and the robot's number of answered cycles.
+//! object, the client's answer times and the robot's rate of commands received in time.
 
 use std::ops::ControlFlow;
 
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut secs, mut lowest_rate, mut sum_rates, mut num_rates) = (0.0, 1.0_f64, 0.0, 0);
     let result = robot.control_joint_positions(InternalController::JointImpedance, |state, step| {
         secs += step.as_secs_f64();
-        // The success rate covers the last 100 cycles; before that it covers fewer.
+        // The success rate covers the last 100 cycles, at the start fewer.
         if secs > 0.1 {
             lowest_rate = lowest_rate.min(state.control_command_success_rate);
             sum_rates += state.control_command_success_rate;

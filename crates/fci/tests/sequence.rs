@@ -244,7 +244,7 @@ fn the_server_takes_the_answer_to_its_present_state_alone() {
     client.udp.send_to(&Client::command(state.message_id - 1, READY), from).unwrap();
     wait_until("a late command is counted", || server.statistics().num_late > 0);
     assert_eq!(server.statistics().num_commands, 0);
-    // Commands from another program of this computer.
+    // Commands from another socket of this computer.
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
     for ahead in 0..20 {
         other.send_to(&Client::command(state.message_id + ahead, READY), from).unwrap();
@@ -274,7 +274,7 @@ fn states_are_counted_only_while_a_client_is_connected() {
 fn a_position_that_is_no_number_stops_the_robot() {
     let server = serve();
     let client = Client::in_motion(&server);
-    // A state is answered repeatedly until a command arrives in its own cycle, first with READY, then with NaN.
+    // States are answered until a command arrives in its own cycle, first with READY, then with NaN.
     for q in [READY, [f64::NAN; 7]] {
         let begin = server.statistics().num_commands;
         while server.statistics().num_commands == begin {

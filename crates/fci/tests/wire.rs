@@ -103,8 +103,8 @@ fn fields_stand_where_libfranka_reads_them() {
     let number = |offset: usize| f64::from_le_bytes(bytes[offset..offset + 8].try_into().unwrap());
     let state = state();
     assert_eq!(number(8), state.base_from_ee[0]);
-    // 8 + 6 * 16 * 8 bytes before the mass; 26 numbers of masses and centres, 4 of elbows and 3 * 7 of torques before
-    // q.
+    // 8 + 6 * 16 * 8 bytes before the mass; 26 numbers of masses, inertias and centres, 4 of elbows and 3 * 7 of
+    // torques before q.
     assert_eq!(number(776), state.ee_mass);
     assert_eq!(number(776 + 8 * (26 + 4 + 21)), state.q[0]);
     // Modes and errors come after 284 numbers; only the success rate follows.

@@ -131,8 +131,8 @@ pub(crate) fn analytic_solutions(
 
 /// Middle of the Panda's range of joint 6, rad.
 const MIDDLE_Q6: f64 = 1.8675;
-/// Below these values a direction of the construction is not defined. Below the first two there is no solution; a
-/// neighbouring q7 has one.
+/// Below these values a direction of the construction is not defined. Below [`MIN_REACH_M`] and [`MIN_AMPLITUDE`]
+/// there is no solution; a neighbouring q7 has one.
 const MIN_REACH_M: f64 = 1e-6;
 const MIN_AMPLITUDE: f64 = 1e-9;
 const MIN_SIN_Q2: f64 = 1e-9;

@@ -54,8 +54,8 @@ impl Capsule {
 pub(crate) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
     /// A segment with a smaller squared length is a point, m².
     const POINT: f64 = 1e-18;
-    /// Two segments are parallel if the squared sine of their angle is below this. Any fraction of the first is then
-    /// valid, and the distance is too large by at most a millionth of the longer segment's length.
+    /// Two segments are parallel if the squared sine of their angle is below this. Any fraction of the first segment
+    /// is then valid, and the distance is too large by at most a millionth of the longer segment's length.
     const PARALLEL: f64 = 1e-12;
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (uu, vv, uv, uw, vw) = (dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w));

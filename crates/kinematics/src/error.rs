@@ -74,7 +74,7 @@ pub enum KinematicsError {
         /// The reason why there is no solution.
         reason: &'static str,
     },
-    /// The trajectory generator rejected its input or failed.
+    /// No trajectory could be computed.
     #[error("no trajectory within the limits: {reason}")]
     Trajectory { reason: String },
 }

@@ -37,7 +37,7 @@ pub trait Arm {
     /// The present state of the hand.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] if the hand does not answer.
+    /// [`RobotError::Lost`] if the hand does not answer; [`RobotError::Hand`] if its last command failed.
     fn hand(&mut self) -> Result<HandState, RobotError>;
 
     /// Starts a motion of the hand, which runs in parallel with the arm's.

@@ -50,7 +50,7 @@ pub trait PartFinder<A: Arm> {
         Vec::new()
     }
 
-    /// The time at which the picture of the last call was taken; `None` if time does not follow a clock.
+    /// The time at which the picture of the last call was taken; `None` if time is simulated.
     fn picture_time(&self) -> Option<Instant> {
         None
     }

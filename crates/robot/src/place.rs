@@ -11,7 +11,8 @@ pub struct Place {
     pub name: String,
     /// x and y of the pose, of the bin's centre or of the centre of the tray's first cell, base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of the part's marked line, and of a tray's x axis: about the vertical from the base's x, rad.
+    /// Direction of the part's marked line, and of the x axis of a tray or bin: about the vertical from the base's x,
+    /// rad.
     pub yaw_rad: f64,
     /// z of the surface under the parts, base frame, m.
     pub surface_m: f64,

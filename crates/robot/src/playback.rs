@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_stop_in_a_corner_stays_on_the_path_and_within_the_limits() {
-        // Half of the distance between the compared positions of the path.
+        // More than half of the distance between two successive positions in `places`.
         const ON_PATH_RAD: f64 = 1e-3;
         let (path, motion) = curved();
         let dynamics = ArmDynamics::new(&ArmGeometry::panda(), 0.08);

@@ -124,7 +124,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the
     /// slowest.
     ///
-    /// This is necessary because a path is timed at samples: between two samples a joint may slightly exceed its limit.
+    /// Necessary because a straight motion in joint space is planned without the tcp's limits, and because between the
+    /// samples of a timed path a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
@@ -147,8 +148,9 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Checks a motion and follows it to its end.
     ///
     /// # Errors
-    /// Before anything moves: [`RobotError::Latched`] or [`RobotError::Stopped`] if the arm may not move now, and
-    /// [`RobotError::Unsafe`]. Later: the error that ended the motion, after which nothing moves.
+    /// Before anything moves: [`RobotError::Latched`] or [`RobotError::Stopped`] if the arm may not move now,
+    /// [`RobotError::Unsafe`], and as for [`Arm::state`]. Later: the error that ended the motion, after which nothing
+    /// moves.
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
         let apart = (trajectory.start() - state.q_commanded).abs();

@@ -1,8 +1,8 @@
 //! Descent with a compliant tcp until a contact is measured by its force.
 //!
 //! ```text
-//! stand, to measure the forces in free air ─> down at a constant speed ─> contact: press with a force ─> stand, report
-//!      └ stiff, with integral action ────────────────┘ └ no contact     └ soft along z
+//! stand, to measure the forces in free air ─> down at a constant speed ─> contact: press with a force ─> report
+//!      └ stiff, with integral action ────────────────┘                    └ soft along z
 //! ```
 //! The force is the robot's own estimate of the external force; the height is the measured one.
 
@@ -251,8 +251,8 @@ mod tests {
     const FREE_AIR_N: f64 = 2.0;
     const MAX_CYCLES: usize = 10_000;
 
-    /// Descends with an arm that is held in place. Once the reference moves, the external force is `pressed_n(f)` for
-    /// the force `f` of the spring, both in N.
+    /// Descends with an arm that is held in place. Once the reference moves, the external force exceeds [`FREE_AIR_N`]
+    /// by `pressed_n(f)` for the force `f` of the spring, both in N.
     fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
         let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let mut descent = Descent::new(touch_down, &arm, q, still);

@@ -29,7 +29,7 @@ pub struct GraspSettings {
     pub workcell: Workcell,
     /// The camera of the pictures.
     pub camera: MountedCamera,
-    /// The given height of the marks; without it, the height is measured.
+    /// The given height of the marks, if any.
     pub told: Option<GivenHeight>,
     /// Fraction of the joints' velocity limits, unless a request gives another one.
     pub speed: f64,

@@ -68,8 +68,8 @@ impl Topics {
         [self.poses.topic(), self.detections.topic(), self.overlays.topic()].join(", ")
     }
 
-    /// Publishes the results of a picture: the pose of the best part, all detections, and the overlay if it has
-    /// subscribers.
+    /// Publishes the results of a picture: the pose of the best part (also to tf), all detections, and the overlay if
+    /// it has subscribers.
     pub(super) fn publish(&mut self, node: &Node, searched: &Searched) {
         let header = &searched.header;
         if let Some((camera_from_tcp, _)) = searched.found.first().and_then(|part| part.grasp) {

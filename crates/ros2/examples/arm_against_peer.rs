@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Moves the last joint by `by_rad` from the arm's position, with the usual checks of every motion.
+/// Moves the arm to the ready pose with the last joint rotated by `by_rad`, with the usual checks of every motion.
 fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), RobotError> {
     let mut robot = Robot::new(arm, SafetyLimits::default(), watch);
     let start = robot.commanded()?;

@@ -19,7 +19,7 @@ pub enum RosError {
     /// An unusable camera_info.
     #[error("camera_info: expected {expected}, found {found}")]
     CameraInfo { expected: String, found: String },
-    /// Frames without a connection, or with an outdated transform.
+    /// No usable transform between two frames.
     #[error("no transform from \"{source_frame}\" to \"{target_frame}\": {why}")]
     Transform { target_frame: String, source_frame: String, why: String },
     /// The network reported an error.

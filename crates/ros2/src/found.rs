@@ -12,7 +12,7 @@ use crate::messages::{
 pub struct FoundPart {
     /// The taught object.
     pub name: String,
-    /// Score, 0 to 1; the threshold is 0.5.
+    /// Score, 0 to 1; the default threshold is 0.5.
     pub score: f64,
     /// Upper left and lower right corner of the part's box, in pixels; the first pixel's centre is (0.5, 0.5).
     pub corners: [Point2<f64>; 2],

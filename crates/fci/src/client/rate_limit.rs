@@ -82,7 +82,7 @@ mod tests {
                     let dq = state.dq_desired[joint];
                     let [min, max] = limits.velocity_range(joint, state.q_desired[joint]);
                     // The velocity limit of an FR3's joints 5 and 7 decreases near their ends faster than the joints
-                    // may brake; only planning can avoid that.
+                    // may brake; only planning can avoid a violation.
                     let can_brake = limits.velocity_near_ends.is_none_or(|near| near[joint].slope < 20.0);
                     assert!(
                         !can_brake || (min..=max).contains(&dq),

@@ -14,7 +14,7 @@ use crate::wire::{
 
 /// Number of stored past states: one second.
 const NUM_RECENT_STATES: usize = 1000;
-/// Maximum duration of a recovery.
+/// Maximum duration of a recovery or a stop.
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Parameters of a connection to a robot.

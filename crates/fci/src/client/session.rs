@@ -181,7 +181,7 @@ impl Session {
                 Err(source) => return Err(socket_error("receive from", self.address, source)),
             }
             if newest.is_none() && Instant::now() >= deadline {
-                // If the robot has closed the connection, `fetch` returns the error for that.
+                // If the robot has closed the connection, `fetch` returns the error.
                 self.fetch()?;
                 return Err(FciError::Timeout { what: "state", address: self.address, waited: self.timeout });
             }

@@ -14,8 +14,8 @@ use crate::wire::{Header, HeaderKind};
 
 /// Time within which a client must accept a response; a slower client counts as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// Time that a second client waits for the end of the first, so that a client that has just disconnected can connect
-/// again at once. It is shorter than a client's timeout for an answer (1 s).
+/// Time for which a second client waits until the first one disconnects, so that a client that has just disconnected
+/// can connect again at once. It is shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 /// Maximum number of events that wait for the loop; a client's further messages wait in the network.
 const MAX_EVENTS: usize = 64;
@@ -210,7 +210,7 @@ impl Link {
         }
     }
 
-    /// Accepts the waiting client when the first has ended, or refuses it after [`HANDOVER`].
+    /// Accepts the waiting client when the other client has disconnected, or refuses it after [`HANDOVER`].
     fn admit_waiting(&mut self) {
         let Some(waiting) = self.waiting.take() else { return };
         if self.client.is_none() {

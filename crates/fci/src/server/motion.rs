@@ -116,7 +116,7 @@ impl Motion {
         if errors.is_empty() { Ok(next) } else { Err(errors) }
     }
 
-    /// Checks that the command is finite: libfranka sends only finite numbers, and a robot would stop for others.
+    /// Checks that the command is finite: libfranka sends only finite numbers.
     fn check_finite(&self, command: &MotionCommand) -> Result<(), RobotErrors> {
         let is_finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let error = match self.generator {

@@ -52,8 +52,8 @@ pub struct RobotCore {
     pub(super) mode: RobotMode,
     pub(super) errors: RobotErrors,
     pub(super) reflex_reason: RobotErrors,
-    /// Whether the arm was in self-collision at the start of the motion; such a motion may continue, to leave the
-    /// collision.
+    /// Whether the arm has been in self-collision since the start of the motion; such a motion may continue, to leave
+    /// the collision.
     pub(super) began_in_self_collision: bool,
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
@@ -252,7 +252,7 @@ impl RobotCore {
                     }
                     return;
                 }
-                // The arm brakes in this cycle already: a reference that stays in place for one cycle is a jerk.
+                // The arm brakes in this cycle already: a reference that stays in place for one cycle would be a jerk.
                 Err(errors) => self.abort(errors),
             }
         }
@@ -286,7 +286,7 @@ impl RobotCore {
             // Braking would continue to press on the obstacle.
             self.references.joints = JointReference::at_rest(self.observation.q);
         } else if is_external {
-            // The arm is not at the reference, and must not move there.
+            // The arm is not at the reference, and must not move to it.
             self.follow_measurement();
         }
         if let Some(motion) = self.motion.take() {

@@ -63,7 +63,7 @@ robot_errors! {
     JointMotionGeneratorVelocityLimitsViolation = "joint_motion_generator_velocity_limits_violation",
     /// The commanded velocity jumps: the acceleration is too large.
     JointMotionGeneratorVelocityDiscontinuity = "joint_motion_generator_velocity_discontinuity",
-    /// The commanded acceleration jumps: the jerk is too large.
+    /// The commanded acceleration jumps: the jerk, or with commanded velocities the acceleration, is too large.
     JointMotionGeneratorAccelerationDiscontinuity = "joint_motion_generator_acceleration_discontinuity",
     /// The first pose differs from the end effector's pose.
     CartesianPositionMotionGeneratorStartPoseInvalid = "cartesian_position_motion_generator_start_pose_invalid",
@@ -73,7 +73,7 @@ robot_errors! {
     CartesianMotionGeneratorVelocityLimitsViolation = "cartesian_motion_generator_velocity_limits_violation",
     /// The commanded twist jumps: the acceleration is too large.
     CartesianMotionGeneratorVelocityDiscontinuity = "cartesian_motion_generator_velocity_discontinuity",
-    /// The commanded acceleration jumps: the jerk is too large.
+    /// The commanded acceleration jumps: the jerk, or with commanded twists the acceleration, is too large.
     CartesianMotionGeneratorAccelerationDiscontinuity = "cartesian_motion_generator_acceleration_discontinuity",
     /// The sign of the elbow changed.
     CartesianMotionGeneratorElbowSignInconsistent = "cartesian_motion_generator_elbow_sign_inconsistent",
@@ -93,7 +93,7 @@ robot_errors! {
     CartesianMotionGeneratorJointVelocityLimitsViolation = "cartesian_motion_generator_joint_velocity_limits_violation",
     /// The pose requires too large an acceleration of a joint.
     CartesianMotionGeneratorJointVelocityDiscontinuity = "cartesian_motion_generator_joint_velocity_discontinuity",
-    /// The pose requires too large a jerk of a joint.
+    /// The pose requires too large a jerk of a joint, or the twist too large a jerk or acceleration.
     CartesianMotionGeneratorJointAccelerationDiscontinuity = "cartesian_motion_generator_joint_acceleration_discontinuity",
     /// The commanded pose is not a rotation and translation.
     CartesianPositionMotionGeneratorInvalidFrameFlag = "cartesian_position_motion_generator_invalid_frame_flag",

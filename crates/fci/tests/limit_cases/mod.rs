@@ -1,6 +1,6 @@
 //! One motion just inside and one just outside of each tested limit of a robot, with this crate's client.
 //!
-//! Each motion moves one signal to `1 - MARGIN` or `1 + MARGIN` of its limit, while all other signals stay well within
+//! Most motions move one signal to `1 - MARGIN` or `1 + MARGIN` of its limit, while all other signals stay well within
 //! their limits.
 
 mod profile;
@@ -318,8 +318,9 @@ fn recover(robot: &mut Robot) -> Result<(), FciError> {
 }
 
 impl Case {
-    /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside its Cartesian limits
-    /// because of its joint limits; the Cartesian limits can be tested alone only if the joint limits are higher.
+    /// Whether the arm moves by commanded poses, twists or elbow positions. A robot may stop such a motion inside its
+    /// Cartesian limits because of its joint limits; the Cartesian limits can be tested alone only if the joint limits
+    /// are higher.
     #[allow(dead_code, reason = "only used with franka-sim, whose joint limits are widened")]
     pub fn is_cartesian(&self) -> bool {
         matches!(

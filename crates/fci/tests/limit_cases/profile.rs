@@ -30,7 +30,7 @@ impl Profile {
         Self([rising, &burst, falling].concat())
     }
 
-    /// Increases to an acceleration in ten steps, holds it for three cycles, and reverses the sequence to return to
+    /// Increases to an acceleration in ten steps, holds it for a few cycles, and reverses the sequence to return to
     /// rest.
     pub fn acceleration(peak: f64) -> Self {
         let up = (1..=10).map(|step| peak * f64::from(step) / 10.0);
@@ -54,7 +54,7 @@ impl Profile {
         Self(shape.0.iter().map(|velocity| velocity * distance / length).collect())
     }
 
-    /// Stores values without conversion, such as torques.
+    /// Stores values that need no conversion, such as torques.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         Self(values.collect())
     }

@@ -53,7 +53,7 @@ pub enum Signal {
 pub enum Axis {
     /// Forward: joint 2 moves most.
     X,
-    /// Sideways: a rotation of the base joint needs the smallest joint motion.
+    /// Sideways: joints 3, 5 and 7 move most.
     Y,
 }
 

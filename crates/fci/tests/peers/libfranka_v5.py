@@ -121,7 +121,7 @@ def main():
 
     run("joint velocities", robot.control_joint_velocity, velocities, 2.0, controller_mode=STIFF)
 
-    # Poses: 6 cm to the side and back, with a rotation.
+    # Poses: 6 cm to the side and back.
     start = robot.read_once().O_T_EE_c
     reached = [0.0]
 
@@ -146,7 +146,7 @@ def main():
 
     run("twists", robot.control_cartesian_velocity, twists, 2.0, controller_mode=STIFF)
 
-    # Torques of a spring hold the arm; the robot adds gravity compensation.
+    # Torques of springs move joint 6 and hold the others; the robot adds gravity compensation.
     start = robot.read_once().q
 
     def torques(state, t):
@@ -234,7 +234,7 @@ def main():
         check("a broken callback ends the motion", "broken" in str(exception), type(exception).__name__)
     check("  idle again", robot.read_once().robot_mode == libfranka.RobotMode.kIdle)
 
-    # A long motion: most of its 10,000 commands must arrive in time.
+    # A long motion: 10,000 commands.
     run("joint positions for 10 s", robot.control_joint_position,
         lambda state, t, start=robot.read_once().q_d: libfranka.JointPositions(
             [q + (0.3 * swing(5.0)(t % 5.0) if i == 1 else 0.0) for i, q in enumerate(start)]),

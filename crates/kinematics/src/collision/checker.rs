@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn lanes_agree_with_pair_by_pair() {
-        // 2⁻¹³ of the longest capsule's axis, 0.2 m.
+        // 2⁻¹³ of the longest capsule's axis, 0.25 m.
         const TOLERANCE_M: f64 = 3e-5;
         let mut rng = Pcg64Mcg::seed_from_u64(21);
         let mut num_inside = 0;

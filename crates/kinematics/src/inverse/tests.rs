@@ -197,8 +197,8 @@ fn the_same_question_has_the_same_bits_in_its_answer() {
 #[test]
 fn singular_configurations_are_reached_too() {
     let panda = ArmGeometry::panda();
-    // The upper arm is upright (q1 and q3 have the same axis); the wrist has z6 in line with the arm; the elbow is as
-    // straight as possible.
+    // An upright upper arm (joints 1 and 3 have the same axis); an elbow as straight as possible; the ends of the
+    // joints' ranges; an arm stretched upwards.
     let mut upright = ready_pose();
     upright[1] = 0.0;
     let mut straight = ready_pose();
@@ -272,8 +272,8 @@ fn an_arm_without_a_closed_form_is_solved_by_descent() {
     assert!(matches!(error, KinematicsError::OutOfReach { .. }), "{error}");
 }
 
-/// Universal Robots' UR5e with its published Denavit–Hartenberg parameters in Craig's convention, with Franka's hand
-/// and without a shape.
+/// Universal Robots' UR5e with its published Denavit–Hartenberg parameters in Craig's convention, with Franka's hand;
+/// capsules and masses are the Panda's.
 fn ur5e() -> ArmGeometry {
     let [quarter, back] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2];
     let rows = [

@@ -25,7 +25,7 @@ pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLi
 }
 
 /// Replaces parts of a path with straight motions: first from waypoint to waypoint, then in at most `attempts` attempts
-/// between random points. Each attempt also moves a waypoint.
+/// between random points. Most attempts also try to move a waypoint.
 pub(super) fn shorten(
     checker: &mut Checker<'_>,
     limits: &JointLimits,

@@ -7,14 +7,14 @@ use sdg_kinematics::{JointVector, NUM_JOINTS};
 
 use crate::arm_state::PERIOD_SECS;
 
-/// Duration of the shortest correction, s: ten times as long as the command losses after which corrections must
-/// converge. Longer corrections double this duration up to [`MAX_DOUBLINGS`] times.
+/// Duration of the shortest correction, s: ten times the longest loss of commands that the robot bridges. Longer
+/// corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
 /// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which
 /// uses at most 0.4 and 0.2 of them).
 const SHARE: f64 = 0.3;
-/// Number of evenly spaced times at which a correction is compared with the limits.
+/// Number of equal steps in which a correction is compared with the limits.
 const NUM_SAMPLES: u32 = 20;
 
 /// A reference, or the difference between two references. Derivatives are differences over a cycle, as the robot

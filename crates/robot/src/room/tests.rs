@@ -31,7 +31,7 @@ fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> 
 
 #[test]
 fn across_the_marked_line_fingers_need_room_for_themselves() {
-    // Half of 20 mm, 10 mm of opening, 15 mm of finger, 2 mm, and half of the next part: 47 mm.
+    // Half of 20 mm, 10 mm of opening, 15 mm of finger, 2 mm of room, and half of the next part: 47 mm.
     check([100.0, 47.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([100.0, 46.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide \

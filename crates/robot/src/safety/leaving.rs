@@ -22,7 +22,7 @@ const MAX_ASCENT_OFFSET_M: f64 = 1e-3;
 pub(crate) struct FeltBelow {
     /// x and y of the tcp on the descent, base frame, m.
     at_m: [f64; 2],
-    /// The lowest allowed z of the tcp on the descent, base frame, m.
+    /// The lowest z at which the tcp counts as being on the descent, base frame, m.
     lowest_m: f64,
     /// Distance below the limits that was allowed for the descent, m.
     below_limits_m: f64,

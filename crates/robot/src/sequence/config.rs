@@ -59,7 +59,7 @@ pub struct GraspConfig {
     /// The load of the hand while it holds the part.
     pub load: Option<Load>,
     /// The compliant descent of the last centimetres before the hand closes, on a compliant arm, for a table height
-    /// that is not known to a millimetre. `None` for motion in joint positions.
+    /// that is not known to a millimetre. `None`: a descent by joint positions.
     pub soft_approach: Option<TouchDown>,
     /// How a camera on the hand measures the part's height; with `None`, or with a camera beside the robot, the height
     /// comes from perception.
@@ -68,8 +68,8 @@ pub struct GraspConfig {
     pub obstacles: Vec<Obstacle>,
     /// Radius of the part around its grasp, m: the held part is kept away from the obstacles like the arm.
     pub part_radius_m: f64,
-    /// The known shape of the part, for its distance from other parts; with `None` only its width between the fingers
-    /// is used.
+    /// The known shape of the part, for its distance from other parts; with `None` a shape is assumed from its width
+    /// between the fingers.
     pub part: Option<PartShape>,
     /// Parts lying in the cell that are known before a picture is taken and must not be touched.
     pub lying: Vec<LyingPart>,

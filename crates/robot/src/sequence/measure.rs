@@ -79,8 +79,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
-        // If one of the first two pictures does not show the part, the next one is taken closer to the part: long parts
-        // fill the picture, and reflections move.
+        // If one of the first two pictures does not show the part, the next one is taken less far to the side: long
+        // parts fill the picture, and reflections move.
         let nearer_m = REPLACEMENT_SHIFT_SHARE * half_m;
         let mut shown_at_m = None;
         for [across_m, along_m] in

@@ -45,7 +45,8 @@ pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place}
 
 use held_part::HeldPart;
 
-/// Minimum height of the arm above the table during free motions, m; less if start or destination is lower.
+/// Minimum height of the arm above the table during free motions, m; less if the destination is lower or, with
+/// obstacles in the cell, the start.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
 /// Time that the arm stands still before a picture, s.
 const SETTLE_SECS: f64 = 0.25;
@@ -69,8 +70,8 @@ pub enum GraspOutcome {
 pub struct GraspReport {
     /// The outcome.
     pub outcome: GraspOutcome,
-    /// The accepted detection of each picture; last, the target at the part's height, if this height was to be
-    /// measured.
+    /// The accepted detection of each picture that `looks` counts; last, the target at the part's height, if this
+    /// height was determined.
     pub targets: Vec<Option<GraspTarget>>,
     /// Numbers of pictures: from look-out poses, and from above the first detection.
     pub looks: [usize; 2],
@@ -79,7 +80,7 @@ pub struct GraspReport {
     /// The verdict of the hand's width and force after closing, lifting and holding: `None` if the part is held,
     /// otherwise the reason.
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
-    /// The contacts of compliant descents, in order.
+    /// The results of the compliant descents, in order.
     pub touched: Vec<Touched>,
     /// The part's height, if it was to be measured.
     pub height: Option<HeightReport>,

@@ -95,7 +95,7 @@ pub struct PlacingReport {
     pub grasp: GraspReport,
     /// The outcome.
     pub outcome: PlacingOutcome,
-    /// The contacts of all placements, and of the compliant approaches of repeated grasps.
+    /// The results of all placements' descents, and of the compliant approaches of repeated grasps.
     pub touched: Vec<Touched>,
     /// The part's offset from its place (from a bin's centre), one for each picture in which the part was detected.
     pub errors: Vec<PlaceOffset>,
@@ -184,7 +184,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             lies.into_iter().for_each(|part| self.known.lying.put(part));
             let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
-                // In a bin a part may lie in any pose, also under others.
+                // In a bin a part may lie in any pose, also under other parts.
                 (None, Some(_)) => return Ok(()),
                 (None, None) => return Err(fails("the part is not seen where it was put down".to_owned())),
             };

@@ -18,7 +18,7 @@ const FINGERTIP_CLEARANCE_M: f64 = 0.002;
 const OPENING_SPEED_M_S: f64 = 0.2;
 /// Time that the arm stands still before the hand closes, s.
 const SETTLE_SECS: f64 = 0.1;
-/// Heights above the grasp from which a straight descent is tried, m.
+/// Heights above the grasp from which a straight descent is tried, after the present height, m.
 const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 /// Opening of the hand beyond a part, both sides together, if other parts leave no room for more, m.
 const NARROW_MARGIN_M: f64 = 0.020;

@@ -6,6 +6,6 @@
 pub struct WorkcellError {
     /// Counted from 1.
     pub line: usize,
-    /// The value that was expected, and the one that was found.
+    /// The cause, in most cases with the expected and the found value.
     pub what: String,
 }

@@ -108,7 +108,7 @@ impl Workcell {
     /// Reads a workcell file.
     ///
     /// # Errors
-    /// [`WorkcellError`] with the line, what was expected and what was found.
+    /// [`WorkcellError`] with the line and the cause.
     pub fn from_toml(text: &str) -> Result<Self, WorkcellError> {
         read(text)
     }

@@ -34,8 +34,9 @@
 //!
 //! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
-//! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
-//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of the solid; centre in the base frame
+//! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length] or capsule_mm = [diameter, length over all],
+//!                                   # along z; or plane_normal = [x, y, z], out of the solid
+//! at_mm = [500, 300, 150]           # centre, or a point of the plane, in the base frame
 //! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; optional
 //!
 //! [[place]]                         # one pose for a part: sdg grasp --place shelf
@@ -56,7 +57,7 @@
 //! at_mm = [450, -300]               # its centre
 //! size_mm = [200, 150]              # inner size, along its x and its y
 //! ```
-//! Every error contains the line. This crate reads no files: it converts a text to a [`Workcell`].
+//! Every [`WorkcellError`] contains the line. This crate reads no files: it converts a text to a [`Workcell`].
 
 mod error;
 mod file;

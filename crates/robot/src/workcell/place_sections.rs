@@ -138,7 +138,8 @@ fn lengths_m(source: &Source<'_>, found: &Spanned<Numbers<2>>, name: &str) -> Re
 }
 
 impl Room<'_> {
-    /// Checks that cells and corners of a place are on the table and in the workspace; otherwise returns the reason.
+    /// Checks that the corners of a place are on the table and its cells in the workspace; otherwise returns the
+    /// reason.
     fn check(&self, place: &Place) -> Result<(), String> {
         let name = &place.name;
         if let Some([x, y]) = self.table_m {

@@ -44,7 +44,7 @@ fn a_whole_file_is_read() {
     assert_eq!(cell.grasp_config().load.unwrap().mass_kg, 0.2);
 }
 
-/// Makes lines of the file invalid, one at a time: the error names the line, the expected and the found value.
+/// Makes lines of the file invalid, one at a time: the error names the line and the cause.
 #[test]
 fn errors_name_the_line() {
     for (line, from, to, expected) in [

@@ -27,7 +27,7 @@ using namespace eprosima::fastrtps::rtps;
 using Bytes = std::vector<char>;
 using Clock = std::chrono::steady_clock;
 
-// A type by name alone: its samples are bytes, the four that name the encoding among them.
+// A type without fields, only with a name: its samples are bytes, including the four that name the encoding.
 class RawType : public TopicDataType {
  public:
   explicit RawType(const std::string& name) {

@@ -1,5 +1,5 @@
-//! Tests that errors are shown on the page with the texts of the command line, and that
-//! nothing else happens.
+//! Tests that errors are shown on the page with the texts of the command line, and not in the
+//! browser's console.
 
 use std::path::PathBuf;
 

@@ -42,7 +42,7 @@ impl Made {
         out
     }
 
-    /// The demonstration, augmented samples of it as PNG, and one as JPEG.
+    /// The demonstration, augmented samples of it as PNG, and the demonstration as JPEG.
     pub fn pictures(&self) -> Vec<PathBuf> {
         let demonstration = demonstration();
         let marks = demonstration.with_file_name("annotation.json");

@@ -48,7 +48,7 @@ fn sigma_is_that_of_the_places_over_the_baseline() {
     // A relief of 1 mm adds its variance.
     let found = triangulate(&one, &other, 0.001).unwrap();
     assert!((found.sigma_m - 0.707_107e-3_f64.hypot(1e-3)).abs() < 1e-8, "{found:?}");
-    // A longer baseline is more exact.
+    // A longer baseline gives a smaller sigma.
     let wide = triangulate(&shown([0.40, 0.3], 0.5, 0.0, 0.0), &shown([0.60, 0.3], 0.5, 0.0, 0.0), 0.0);
     assert!(wide.unwrap().sigma_m < 0.5e-3);
 }
@@ -84,7 +84,8 @@ fn pictures_that_tell_no_height_are_refused() {
 
 #[test]
 fn of_several_parts_the_pair_is_found_that_is_one_part() {
-    // Three parts in a row along the baseline, 25 mm apart: each line of sight crosses those to all others.
+    // Three parts in a row along the baseline, 25 mm apart: each line of sight crosses all those of the other
+    // picture.
     let parts_m = [0.485, 0.51, 0.535];
     let look = |camera_x_m: f64| parts_m.map(|part_x_m| shown([camera_x_m, 0.3], part_x_m, 0.016, 0.02));
     let (ones, mut others) = (look(0.44), look(0.56));

@@ -31,7 +31,7 @@ fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
     Trajectory::along_path(path, &JointLimits::panda(), &slow).unwrap()
 }
 
-/// Whether a straight motion from one tcp position to another is allowed after a descent to `lowest_m`.
+/// Whether a straight motion from one tcp position to another is allowed after the descent `felt`.
 fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
     let start = at(from[0], from[1], from[2]);
     let motion = line(&start, &tcp(to[0], to[1], to[2]));

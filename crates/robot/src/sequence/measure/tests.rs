@@ -119,7 +119,7 @@ fn a_picture_that_does_not_show_the_part_is_the_reason() {
     let (report, ..) = grasped(&config(None), &[false], true);
     let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
     assert!(why.ends_with("the first picture does not show the part"), "{why}");
-    // A third picture, closer to the part, can replace the first or the second; so can a fourth along the marked line.
+    // A third picture, less far to the side, can replace the first or second; so can a fourth along the marked line.
     for shows in [&[true, false, true][..], &[false, true, true], &[true, false, false, true]] {
         let (report, places, num_sights) = grasped(&config(None), shows, true);
         assert_eq!((report.outcome, num_sights), (GraspOutcome::Held, shows.len()));
