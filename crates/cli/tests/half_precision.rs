@@ -129,7 +129,7 @@ fn nearest(found: &Detections, i: usize, among: &Detections) -> Option<usize> {
 /// The effects of rounding on the detections of all pictures.
 #[derive(Debug, Default)]
 struct Comparison {
-    /// Number of detections in full precision.
+    /// Number of compared detections in full precision.
     sure: usize,
     /// Number of these that are replaced by a neighbour whose score differs by less than [`TIE`].
     ties: usize,
