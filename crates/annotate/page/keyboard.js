@@ -13,7 +13,7 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const help = document.getElementById("help");
 const overlay = document.getElementById("overlay");
 
-/** Creates the chosen mark without a pointer, in the middle of the view; it can be moved from there. */
+/** Creates the chosen mark without a pointer, in the middle of the view or of the part; it can be moved from there. */
 function putInTheMiddle() {
   if (state.tool === "outline") {
     if (state.draft) closeOutline(state.draft.points);
@@ -44,7 +44,7 @@ export function fitOrPart() {
   else fit();
 }
 
-/** A mark chosen by key is made by keys: Enter goes to the photo, whichever button was pressed before. */
+/** A mark chosen by key is made by keys: the photo gets the focus, so that Enter does not press a button. */
 function choose(tool) {
   setTool(tool);
   if (!document.activeElement?.closest("#stage")) overlay.focus({ preventScroll: true });

@@ -114,7 +114,7 @@ function words(entry, trying) {
   return count ? `${count} found` : "nothing found";
 }
 
-/** The indices of the pictures in the order of the row; those not yet searched come last. */
+/** The indices of the pictures in the order of the row; by score or state, those not yet searched come last. */
 function order(entries, trying) {
   const numbers = entries.map((_, i) => i);
   if (!trying || state.sortedBy === "added") return numbers;

@@ -144,7 +144,7 @@ function renderProgress(news) {
   by("progress-text").textContent = progressText();
   by("teach-form").hidden = isRunning();
   by("teach-stop").hidden = !isRunning();
-  // Before the first result there is nothing to keep.
+  // Before the first usable result there is nothing to keep.
   const keeps = news.validations.some(([, share]) => share >= 0.5);
   by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
