@@ -282,7 +282,7 @@ fn dry_run<A: Arm>(
     Ok(())
 }
 
-/// Prints the closing lines, or the JSON object.
+/// Prints the closing lines, and with `--json` the JSON object.
 fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
         println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
