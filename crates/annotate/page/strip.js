@@ -33,7 +33,7 @@ export function openNext(step) {
   if (next !== undefined) (trying ? openTrialPicture : openImage)(next);
 }
 
-/** The server's view of all pictures to try and of the models, after one was removed or restored. */
+/** Adopts the server's view of the pictures to try and of the models, after a picture was removed or restored. */
 function adoptSession(session) {
   for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
   state.models = session.models;

@@ -201,7 +201,7 @@ function renderFolds() {
 }
 by("teach-form").addEventListener("change", changed);
 
-/** The model in use and its settings of the part are selected. */
+/** Whether the model in use and its settings of the part were selected in the form. */
 let preselected = false;
 function preselect() {
   const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);

@@ -271,7 +271,7 @@ function renderFound() {
   }
 }
 
-/** Refused detections that are shown by default: the best one, if nothing is accepted and it resembles the part. */
+/** Whether a refused detection is shown: by default only the best one, if nothing is accepted and its score is high enough. */
 export function isShown(detection, { detections }) {
   if (state.showRefused) return true;
   return detection === detections[0] && detection.score >= MIN_SHOWN;
