@@ -95,7 +95,7 @@ function focused() {
   return { kind: data.kind, edge: data.edge, end: data.end, jaw: data.jaw !== undefined, vertex };
 }
 
-// The focus on the photo is shown only to keyboard users: browsers cannot distinguish this for drawings.
+// The focus on the photo is shown only to keyboard users: browsers do not distinguish these users in drawings.
 document.addEventListener("keydown", () => document.documentElement.toggleAttribute("data-keys", true), true);
 document.addEventListener("pointerdown", () => document.documentElement.removeAttribute("data-keys"), true);
 

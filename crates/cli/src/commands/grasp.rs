@@ -327,7 +327,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     }
 }
 
-/// Whether a picture was taken and did not contain the part. If a motion was rejected before, no picture was taken.
+/// Whether a picture was taken and did not contain the part. If the first motion was rejected, no picture was taken.
 fn is_nothing_found(report: &GraspReport) -> bool {
     let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
     is_look && report.targets.last() == Some(&None)
