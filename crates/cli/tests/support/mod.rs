@@ -37,7 +37,7 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
 /// without a camera.
 ///
 /// Many tests need one of these models (one per camera file), each in its own process, and teaching takes seconds. The
-/// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy the file.
+/// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy it.
 pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
     fs::create_dir_all(&folder).unwrap();
