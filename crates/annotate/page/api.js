@@ -1,6 +1,6 @@
 // Requests to the server. Errors are one line of text for the user.
 
-/** A failed request; `message` can be shown to the user. `lost`: the server did not answer at all. */
+/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. */
 export class RequestError extends Error {
   constructor(message, lost = false) {
     super(message);

@@ -247,7 +247,7 @@ export function clear(kind) {
   changed();
 }
 
-/** Deletes the selected point or the selected mark. */
+/** Deletes the last point of a drawing, the selected point, or the selected mark. */
 export function deleteSelected() {
   const { outline } = marks();
   if (state.draft?.points?.length) {

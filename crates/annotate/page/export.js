@@ -1,4 +1,4 @@
-// All detections as a file: one line per grasp, or JSON with the fields of "sdg detect --json".
+// All detections as a file: CSV with one line per grasp, or JSON similar to that of "sdg detect --json".
 
 import { gripperOf } from "./geometry.js";
 import { isFound, state, touchedBy } from "./store.js";

@@ -1,4 +1,4 @@
-// The other pictures of the project's folder, and photos from elsewhere, added one by one.
+// The other pictures of the project's folder, and photos from elsewhere, which can be added.
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";

@@ -57,7 +57,7 @@ export function isWithin([x, y], polygon) {
   }).length % 2 === 1;
 }
 
-/** A point inside a polygon close to a point beside it: from the nearest point of the outline inwards, half as far as the polygon extends there. */
+/** A point inside a polygon close to a point beside it: from the nearest point of the outline inwards, half as far as the polygon extends there, at most half of `depth`. */
 export function nearestWithin(polygon, point, depth) {
   const foot = polygon.map((to, i) => footOn(point, polygon.at(i - 1), to)).reduce((best, p) => (norm(sub(p, point)) < norm(sub(best, point)) ? p : best));
   const way = sub(foot, point);

@@ -192,7 +192,7 @@ function nearestVertex(place) {
   return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
 }
 
-/** The mark that is dragged from a place: between the jaws it is the gripper if its line is closer than the outline, whose reach covers thin parts; its middle and ends are taken before the outline's line, but not before its points. */
+/** The mark that is dragged from a place. The outline's clickable area can cover the gripper of a thin part: between the jaws, the gripper is dragged if its line is closer than the outline. At its middle and ends, the gripper is dragged unless a point of the outline is there. */
 function takenAt(target, from) {
   const taken = target.closest?.("[data-kind]");
   const { grasp, outline } = marks();
@@ -315,7 +315,7 @@ export function holdSpace(held) {
   spaceHeld = held;
 }
 
-/** Ends the current drawing; otherwise clears the selection. */
+/** Cancels the current drawing; otherwise clears the selection. */
 export function letGo() {
   abandonRegion();
   if (gesture || state.draft) return abandon();

@@ -14,7 +14,7 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const help = by("help");
 const overlay = by("overlay");
 
-/** Creates the chosen mark without a pointer, in the middle of the view; it can be moved from there. */
+/** Creates the chosen mark without a pointer, in the middle of the view or of the part; it can be moved from there. */
 function putInTheMiddle() {
   if (state.tool === "outline") {
     if (state.draft) closeOutline(state.draft.points);
@@ -45,7 +45,7 @@ export function fitOrPart() {
   else fit();
 }
 
-/** A mark chosen by key is made by keys: Enter goes to the photo, whichever button was pressed before. */
+/** A mark chosen by key is made by keys: the photo gets the focus, so that Enter does not press a button. */
 function choose(tool) {
   setTool(tool);
   if (!document.activeElement?.closest("#stage")) overlay.focus({ preventScroll: true });
@@ -96,7 +96,7 @@ function focused() {
   return { kind: data.kind, edge: data.edge, end: data.end, jaw: data.jaw !== undefined, vertex };
 }
 
-// The focus on the photo is shown only to keyboard users: browsers cannot distinguish this for drawings.
+// The focus on the photo is shown only to keyboard users: browsers do not distinguish these users in drawings.
 document.addEventListener("keydown", () => document.documentElement.toggleAttribute("data-keys", true), true);
 document.addEventListener("pointerdown", () => document.documentElement.removeAttribute("data-keys"), true);
 

@@ -251,7 +251,7 @@ export function renderOverlay() {
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();
   drawn = next;
-  // The selection is on top, so that nothing covers it. It has the focus: the other groups are moved below it.
+  // The selection is on top, so that nothing covers it. Moving it would take its focus: the other groups are moved.
   const order = ["grasp", "outline", "box"].filter((key) => key !== state.selected);
   const groups = [...order, state.selected, "draft"].map((key) => drawn.get(key)).filter(Boolean);
   for (let i = groups.length - 2; i >= 0; i -= 1) {

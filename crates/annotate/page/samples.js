@@ -34,7 +34,7 @@ export function renderSamples() {
     problem.textContent = "There is nothing to show yet: draw a box around the part first.";
     return sheet.replaceChildren();
   }
-  // The revision distinguishes pictures of the same address.
+  // With the revision, the samples of changed marks have other addresses.
   const revision = image().revision;
   sheet.replaceChildren(...Array.from({ length: COUNT }, (_, i) => {
     const item = document.createElement("li");

@@ -89,7 +89,7 @@ async function meetAgain() {
   changed();
 }
 
-/** Marks stored when the page was closed or reloaded without a server. */
+/** Sends the marks that were stored when the page was closed or reloaded without a server. */
 export async function sendKept(project) {
   const text = localStorage.getItem(KEPT);
   localStorage.removeItem(KEPT);

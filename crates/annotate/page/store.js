@@ -4,7 +4,7 @@ import { boxPolygon } from "./geometry.js";
 
 export const state = {
   label: "",
-  /** Whether the user gave that name; otherwise it is a proposal. */
+  /** Whether the user or existing marks gave that name; otherwise it is a proposal. */
   isNamed: true,
   modelPath: "",
   /** The project's folder, or the file of a photo's project; other pictures of the folder; versions of the model, oldest first. */
@@ -24,7 +24,7 @@ export const state = {
   /** The mark being corrected: box, grasp, outline; and the outline's selected point. */
   selected: null,
   vertex: null,
-  /** The current drawing: a box, a line, an unclosed outline. */
+  /** The current drawing: a box, a gripper's line, an unclosed outline, a stroke. */
   draft: null,
   proposing: false,
   /** The camera's address; null without one. */

@@ -34,7 +34,7 @@ export function openNext(step) {
   if (next !== undefined) (trying ? openTrialPicture : openImage)(next);
 }
 
-/** The server's view of all pictures to try and of the models, after one was removed or restored. */
+/** Adopts the server's view of the pictures to try and of the models, after a picture was removed or restored. */
 function adoptSession(session) {
   for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
   state.models = session.models;
@@ -115,7 +115,7 @@ function words(entry, trying) {
   return count ? `${count} found` : "nothing found";
 }
 
-/** The indices of the pictures in the order of the row; those not yet searched come last. */
+/** The indices of the pictures in the order of the row; by score or state, those not yet searched come last. */
 function order(entries, trying) {
   const numbers = entries.map((_, i) => i);
   if (!trying || state.sortedBy === "added") return numbers;

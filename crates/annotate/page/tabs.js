@@ -19,7 +19,7 @@ export function openTab(name) {
   if (name === "teach" || name === "try") refreshVersions();
 }
 
-/** Whether versions are stale depends on marks changed since. */
+/** Requests the versions again: changed marks may have made them stale. */
 async function refreshVersions() {
   try {
     // Marks that are being sent come first.

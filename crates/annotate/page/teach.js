@@ -143,7 +143,7 @@ function renderProgress(news) {
   by("progress-text").textContent = progressText();
   by("teach-form").hidden = isRunning();
   by("teach-stop").hidden = !isRunning();
-  // Before the first result there is nothing to keep.
+  // Before the first usable result there is nothing to keep.
   const keeps = news.validations.some(([, share]) => share >= 0.5);
   by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
@@ -200,7 +200,7 @@ function renderFolds() {
 }
 by("teach-form").addEventListener("change", changed);
 
-/** The model in use and its settings of the part are selected. */
+/** Whether the model in use and its settings of the part were selected in the form. */
 let preselected = false;
 function preselect() {
   const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);

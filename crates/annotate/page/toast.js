@@ -20,7 +20,7 @@ export function toast(text, action = null) {
     note.append(button);
   }
   const end = () => {
-    // The note stays while the pointer is on it.
+    // The note stays while the pointer or the focus is on it.
     if (note.matches(":hover, :focus-within")) setTimeout(end, SHOWN_MS);
     else note.remove();
   };

@@ -270,7 +270,7 @@ function renderFound() {
   }
 }
 
-/** Refused detections that are shown by default: the best one, if nothing is accepted and it resembles the part. */
+/** Whether a refused detection is shown: by default only the best one, if nothing is accepted and its score is high enough. */
 export function isShown(detection, { detections }) {
   if (state.showRefused) return true;
   return detection === detections[0] && detection.score >= MIN_SHOWN;
@@ -286,7 +286,7 @@ function renderJudge() {
   const [above, sure] = [isFound, isAccepted].map((which) => places.filter(which).length);
   const isLow = state.minScore < MODEL_LIMIT;
   const inPictures = looked.filter((trial) => trial.detections.some(isFound)).length;
-  // Tracked parts are judged by their track: there the option requires searching each frame on its own.
+  // In live pictures, tracked parts are judged by their track: --min-score then requires --every-frame.
   const ofLive = state.camera ? `; with --from also --every-frame` : "";
   by("least-score-back").hidden = state.minScore === MODEL_LIMIT;
   const beyond = state.minScore === MODEL_LIMIT ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;

@@ -13,7 +13,7 @@ const list = by("version-list");
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
-/** Selected for comparison. */
+/** The versions selected for comparison. */
 let chosen = [];
 
 /** The results without intervals and errors, for a list of models. */
@@ -33,7 +33,7 @@ export function figuresText({ figures, negatives }) {
   return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0% interval: ${Math.round(100 * low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]}.${more}${said}`;
 }
 
-/** Grade of the result: good, doubtful, or poor. Thresholds chosen by hand: nine of ten, and seven of ten. */
+/** Grade of the result: good, doubtful, or poor. The thresholds were chosen by hand. */
 export function gradeOf({ figures }) {
   if (!figures) return "good";
   const found = figures.found[0] / Math.max(figures.found[1], 1);

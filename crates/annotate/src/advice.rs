@@ -35,7 +35,7 @@ const HAND_TOO_SMALL: &str = "The part is wider here than the hand opens. Grasp 
 pub struct Advice {
     /// Every model, in the order of their letters.
     pub models: Vec<ModelAdvice>,
-    /// Problems, worst first.
+    /// Problems with the outline, the grasp and the part's place, in this order.
     pub remarks: Vec<Remark>,
 }
 

@@ -37,7 +37,8 @@ pub struct Opened {
     pub note: Option<String>,
 }
 
-/// Reads the marks of a picture; `annotation` names their file, otherwise it is the picture's name with `.json`.
+/// Reads the marks of a picture from `annotation` (default: the picture's name with `.json`), or from the file beside
+/// it with `.coco.json` if that exists.
 ///
 /// # Errors
 /// The file exists but cannot be read, is no annotation, or belongs to another picture.

@@ -32,7 +32,7 @@ pub enum Error {
         /// The reason.
         source: sdg_demonstration::Error,
     },
-    /// A file could not be written.
+    /// A file could not be read or written by [`sdg_files`].
     #[error(transparent)]
     Write(#[from] sdg_files::FileError),
     /// Marks needed for the request are missing.
@@ -47,7 +47,7 @@ pub enum Error {
     /// A file is not a project's file.
     #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
-    /// The file of the page's token contains no such token.
+    /// The file of the page's token contains no valid token.
     #[error(
         "{}: expected a token of at least 16 letters or digits, found {found} characters (delete the file to renew it)",
         path.display()
@@ -72,7 +72,7 @@ pub enum Error {
     /// An invalid request.
     #[error("{what}: expected {expected}, found {found}")]
     Request { what: &'static str, expected: String, found: String },
-    /// The page's state does not allow the request, mostly because another operation must end first.
+    /// The page's state does not allow the request.
     #[error("{0}")]
     Busy(&'static str),
     /// Nothing has been taught yet.

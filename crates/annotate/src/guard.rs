@@ -8,7 +8,7 @@
 use crate::error::{Error, Result};
 use crate::http::{Head, Response};
 
-/// Length of the token: 128 bits, which cannot be guessed.
+/// Length of the token in bytes; its 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
 /// The token and the server's own names, against which every request is checked.

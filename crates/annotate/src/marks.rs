@@ -101,7 +101,7 @@ impl Marks {
     }
 
     /// The COCO file with these marks and the object's name; without box and outline, the file of a picture without
-    /// objects. Reading the file back validates the marks: everything written can be taught.
+    /// objects. Reading the file back validates the marks.
     ///
     /// # Errors
     /// Marks outside the picture or of zero size; an outline that crosses itself.

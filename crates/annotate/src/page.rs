@@ -1,7 +1,7 @@
 //! The page's files, compiled in: the page loads nothing from other servers and needs no build step.
 //!
-//! They are sent without indentation and without comment-only lines, which saves a seventh. Line numbers are kept, so
-//! that messages in the browser refer to lines of the files in page/.
+//! They are sent without indentation and without comment-only lines, which saves about a seventh. Line numbers are
+//! kept, so that messages in the browser refer to lines of the files in page/.
 
 /// The page's HTML document, as in page/.
 const INDEX: &str = include_str!("../page/index.html");

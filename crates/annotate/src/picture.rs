@@ -48,7 +48,7 @@ impl Picture {
     /// The pixels, upright.
     ///
     /// # Errors
-    /// The file has become unreadable or was replaced since it was opened.
+    /// The file has become unreadable, or its picture has another size now.
     pub fn pixels(&self) -> Result<RgbImage> {
         let image = decode(&read(&self.path)?, &self.name)?;
         if [image.width(), image.height()] == self.size {

@@ -83,7 +83,7 @@ pub fn label_of(opened: &Path) -> Option<String> {
     if let Some(label) = file.as_ref().and_then(|file| file.label.clone()) {
         return Some(label);
     }
-    // Without a project's file, the photo's marks give the name.
+    // Without a name in the project's file, the photo's marks give it.
     let first = file.and_then(|file| file.photos.first().map(|name| place.folder.join(name)));
     let photo = if place.is_folder { first? } else { opened.to_owned() };
     let size = Picture::open(&photo).ok()?.size;
@@ -344,7 +344,7 @@ mod tests {
         }
         let place = ProjectPlace::of_photo(&at("a.png")).unwrap();
         assert_eq!(place.file, at("a.sdg-project.json"));
-        // No other file of the folder is added, and opening writes no file.
+        // No other file of the folder is added, and a photo alone needs no project's file.
         assert_eq!(ProjectFile::open(&place).unwrap().0, ProjectFile::default());
         let bare = ProjectFile { photos: vec!["a.png".into()], ..ProjectFile::default() };
         bare.write(&place).unwrap();

@@ -26,7 +26,7 @@ pub struct State {
     pub images: Vec<MarkedPicture>,
     pub trial_pictures: Vec<TrialPicture>,
     pub models: ModelVersions,
-    /// Location of the project; `None` until there is a photo.
+    /// Location of the project; `None` for a camera before its first photo.
     pub place: Option<ProjectPlace>,
     /// Names of pictures of the project's folder that were removed in earlier sessions.
     pub removed_earlier: BTreeSet<String>,
@@ -169,7 +169,7 @@ impl State {
         self.models.versions.iter().enumerate().map(view).collect()
     }
 
-    /// Writes the project's file, if there is a photo.
+    /// Writes the project's file, if the session has a project.
     ///
     /// # Errors
     /// The folder cannot be written to.
@@ -198,7 +198,7 @@ impl State {
         file.keep_missing(&self.gone);
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
         file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
-        // Removed once and added again under the same name.
+        // A picture that was removed and added again under the same name is not listed as removed.
         for there in file.photos.iter().chain(file.tried.iter().map(|tried| &tried.file)) {
             file.removed.remove(there);
         }

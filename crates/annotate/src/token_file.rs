@@ -6,10 +6,10 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 
-/// Reads the page's token, or creates one that only its owner can read.
+/// Reads the page's token; without the file, creates it with a new token, readable by its owner only.
 ///
 /// # Errors
-/// The file cannot be read or written, or contains no token.
+/// The file cannot be read or written, or contains no token; there are no random bytes for a new token.
 pub fn token_of_file(path: &Path) -> Result<String> {
     const MAX_BYTES: u64 = 4096;
     if !path.exists() {

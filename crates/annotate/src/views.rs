@@ -130,7 +130,7 @@ pub struct SessionView {
     pub id: String,
     /// The object's name.
     pub label: String,
-    /// Whether the user gave that name; otherwise it is a proposal.
+    /// Whether the user or existing marks gave that name; otherwise it is a proposal.
     pub is_named: bool,
     /// Pictures of the folder that are not in the project.
     pub others: Vec<OtherView>,
@@ -146,7 +146,7 @@ pub struct SessionView {
     pub region: Option<Region>,
     /// Whether the camera of the photos is calibrated; the part's size is then known.
     pub is_calibrated: bool,
-    /// The project: its folder, or the file of a photo's project; `None` until there is a photo.
+    /// The project: its folder, or the file of a photo's project; `None` for a camera before its first photo.
     pub project: Option<String>,
     /// Whether the page can close this project and choose another.
     pub can_close: bool,

@@ -47,7 +47,7 @@ fn a_project_is_opened_again_where_it_was_left() {
     let again = get(&served);
     for what in ["label", "images", "trial_pictures", "models"] {
         let mut left = left[what].clone();
-        // Paths of the model and of saved files may differ; everything else must be equal.
+        // The notes on the photos' files may differ; everything else must be equal.
         if what == "images" {
             left.as_array_mut().unwrap().iter_mut().for_each(|image| image["note"] = again[what][0]["note"].clone());
         }
@@ -100,7 +100,7 @@ fn a_version_keeps_the_settings_of_the_part() {
     teach(&served);
     let request = json!({"model": "S", "symmetry": 2, "fixed_height": true, "steps": 100_000}).to_string();
     let begun = served.ask("POST", "/api/teaching", request.as_bytes()).json();
-    // Marks made in the meantime are not used by this teaching run.
+    // The numbers of photos and of negatives are those at the start.
     assert_eq!((&begun["photos"], &begun["negatives"]), (&json!(1), &json!(0)));
     served.ask("DELETE", "/api/teaching", b"").json();
     while served.ask("GET", "/api/teaching", b"").json()["status"] != "failed" {

@@ -4,7 +4,7 @@ use sdg_picture::{JpegEnd, JpegScanner, PpmHead};
 
 use crate::decode::{MAX_ENCODED_BYTES, PNG_START};
 
-/// Number of bytes outside pictures from which on they are reported, even if no picture follows.
+/// Number of bytes outside pictures at which they are reported although no picture follows.
 const MAX_GARBAGE_BYTES: usize = 1 << 20;
 
 /// The start marker, and the first byte of the next marker.

@@ -97,7 +97,7 @@ fn nodes_tell_their_formats_and_sizes() {
 #[test]
 #[ignore = "needs vivid: make test-v4l"]
 fn yuyv_and_rgb_frames_have_the_bars_colours_and_the_format_can_change() {
-    // Opened by the formats of the driver, by the name and by the path.
+    // Opened by name and by path.
     let path = format!("v4l:{}", vivid().path.display());
     let changes = [
         ("v4l:vivid", 640, 480, Encoding::Yuyv),

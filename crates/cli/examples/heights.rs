@@ -239,7 +239,7 @@ impl Found {
         )
     }
 
-    /// Prints the measurements in the pictures.
+    /// The measurements in the pictures, as a JSON line.
     fn raw(&self, case: &Case) -> String {
         let HeightReport { sightings, why_not, .. } = self.report.height.clone().unwrap_or_default();
         let sightings = sightings.iter().map(|sighting| {

@@ -99,8 +99,8 @@ impl Cell {
         let lay_m = self.workcell.base_from_object().context("a part")?.translation.z;
         let mut is_lifted = false;
         loop {
-            // On a slow computer, simulated time is skipped: otherwise requests would wait forever, and the arm would
-            // move too fast to catch up.
+            // On a slow computer, the simulation stays behind the clock: otherwise requests would wait forever, and the
+            // arm would move too fast to catch up.
             let behind_secs = begun.elapsed().as_secs_f64() - self.secs - MAX_BEHIND_SECS;
             begun += Duration::from_secs_f64(behind_secs.max(0.0));
             let until_secs = begun.elapsed().as_secs_f64();

@@ -43,7 +43,7 @@ pub struct Wording<'a> {
 }
 
 impl Wording<'_> {
-    /// A detection in words, also in metres if the camera is known. For a refused one, the reasons follow; for an
+    /// A detection in words, also in millimetres if the camera is known. For a refused one, the reasons follow; for an
     /// accepted one, the other parts that the jaws would touch.
     pub fn line(&self, found: &Found, touched: &[&GraspDetection]) -> String {
         let Found { detection, pose } = found;

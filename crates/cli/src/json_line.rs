@@ -7,10 +7,10 @@ use serde_json::ser::{CompactFormatter, Formatter};
 
 /// Six decimals: a millionth of a metre, pixel, degree or second is below the accuracy of every printed value.
 const ROUND_TO: f64 = 1e6;
-/// Larger numbers have at most six decimals anyway, and rounding would change the digits before the point.
+/// Larger numbers are written as they are: their own precision is about a millionth, or lower.
 const MAX_ROUNDED: f64 = 4e9;
 
-/// A line of compact JSON without a line end; numbers have at most six decimals.
+/// A line of compact JSON without a line end; numbers below [`MAX_ROUNDED`] have at most six decimals.
 ///
 /// # Errors
 /// The value cannot be serialised.

@@ -320,7 +320,7 @@ mod tests {
         RgbImage::from_fn(200, 120, |x, y| image::Rgb([(x * 5 % 251) as u8, (y * 7 % 241) as u8, 90]))
             .save(&photo)
             .unwrap();
-        // At the middle of the line, the outline is twice as wide as elsewhere.
+        // At the start of the line, the outline is twice as wide as at its middle.
         let labelme = r#"{"imageWidth": 200, "imageHeight": 120, "shapes": [
             {"label": "bar", "shape_type": "polygon", "group_id": 1, "points": [[20, 40], [60, 40], [60, 20], [80, 20], [80, 40],
                 [180, 40], [180, 80], [80, 80], [80, 100], [60, 100], [60, 80], [20, 80]]},

@@ -60,7 +60,7 @@ fn write_torchvision_model(model: &str, path: &Path) {
     for (name, shape) in names {
         let count = shape.iter().product();
         let values: Vec<f32> = match shape.len() {
-            // Scales and variances of norms are 1; shifts and biases are 0.
+            // Variances and the scales of norms named `bn` are 1; all other values are 0.
             0 | 1 => {
                 vec![
                     if name.ends_with("var") || name.contains("bn") && name.ends_with("weight") { 1.0 } else { 0.0 };
@@ -84,7 +84,8 @@ fn a_whole_r50_is_converted_and_taught_for_a_few_steps() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (theirs, ours, out) = (at("torchvision.safetensors"), at("converted.safetensors"), at("part.sdg"));
     write_torchvision_model("keypointrcnn_resnet50_fpn", Path::new(&theirs));
-    // The memory limit is 1.5 times the file's size. Measured for this file of 237 MB: at most 13 MB of memory, 0.8 s.
+    // The address space is limited to 1.5 times the file's size. Measured for this file of 237 MB: at most 13 MB of
+    // memory, 0.8 s.
     let bytes = fs::metadata(&theirs).unwrap().len();
     let start = Instant::now();
     let converted = sdg_within(bytes * 3 / 2, &["weights", "convert", &theirs, &ours]);

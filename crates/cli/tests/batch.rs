@@ -10,7 +10,7 @@ use crate::support::{Folder, pendulum_twice, sdg, shipped, stdout, taught_pendul
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::{Value, json};
 
-/// A folder with the lever's photo and marks, and a model S taught from them.
+/// Writes the pendulum's photo and marks, and a model S taught from them; returns the model's path.
 fn taught(folder: &Folder) -> String {
     fs::copy(shipped("pendulum", "image.png"), folder.path("photo.png")).unwrap();
     fs::copy(shipped("pendulum", "annotation.json"), folder.path("photo.json")).unwrap();
@@ -104,7 +104,7 @@ fn a_picture_comes_from_standard_input() {
 fn a_refusal_says_why_and_what_would_help() {
     let folder = Folder::new();
     let model = taught(&folder);
-    // A sheet covers more than half of the lever.
+    // A sheet covers one half of the part's box.
     let mut covered = photo();
     let line = &lines(&sdg(&["detect", "--grasp-model", &model, "--json", &folder.path("photo.png")]))[0];
     let bounds: Vec<f64> =
@@ -194,7 +194,7 @@ fn the_figures_of_a_teaching_are_those_of_an_evaluation_on_the_same_samples() {
     assert_eq!(evaluated["wrong"], taught["wrong"]);
     assert_eq!(evaluated["false_alarms"], taught["false_alarms"]["count"]);
     assert_eq!(evaluated["pictures_without_part"], taught["false_alarms"]["of"]);
-    // Labels in a file are decimal.
+    // Labels in a file are rounded decimal numbers, so the errors differ slightly.
     let errors = taught["errors"].as_object().unwrap();
     assert_eq!(errors.len(), evaluated["errors"].as_object().unwrap().len());
     for (name, error) in errors {
@@ -278,7 +278,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     let words = stdout(&["detect", "--grasp-model", &model, &near, &far]);
     let told = words.lines().filter(|line| line.contains("warning: the jaws would touch the part at ("));
     assert!(told.clone().count() >= 1 && told.clone().all(|line| line.contains("near.png")), "{words}");
-    // A part outside the region does not count.
+    // A refused detection does not count as a neighbour.
     let alone = sdg(&["detect", "--grasp-model", &model, "--all", "--min-score", "1", "--json", &near]);
     let alone = lines(&alone);
     let listed = alone[0]["detections"].as_array().unwrap();

@@ -282,7 +282,7 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
     let cost = &above["focal_cost"];
     assert_eq!(number(&cost["mark_height_mm"]), 20.0);
     // From straight above at 0.44 m (1108 px assumed for 1000), for a point 20 mm above the table at a horizontal
-    // distance of 0.294 m: 0.294 · 20 · (1 / (0.9 · 443) - 1 / 443) mm.
+    // distance of 294 mm: 294 · 20 · (1 / (0.9 · 443) - 1 / 443) mm.
     assert!((number(&cost["at_border_mm"]) - 1.47).abs() < 0.1, "{above}");
     assert!(number(&cost["at_sheet_mm"]) < 0.2, "{above}");
     assert_eq!(table("given.png", 0.0, &["--focal-px", "1000"])["focal"]["source"], "given");

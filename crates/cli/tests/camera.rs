@@ -27,7 +27,7 @@ impl Folder {
     }
 }
 
-/// Asserts the exit code, and one line on standard error with every part.
+/// Asserts the exit code, and that standard error contains every part.
 fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{stderr}");
@@ -54,8 +54,8 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     };
     let line: Value = serde_json::from_str(&detect(&["--json"])).unwrap();
     let found = &line["detections"][0];
-    // Calculated by hand from the marks on the photo, which is vertical: focal length 550 pixels, 0.564 m above the
-    // marks.
+    // Calculated by hand from the grasp's pixel in the photo, which is vertical: focal length 550 pixels, 0.564 m above
+    // the marks.
     let number = |value: &Value| value.as_f64().unwrap();
     let [x, y] = ["x", "y"].map(|axis| number(&found["grasp"][axis]));
     let pose = &found["pose"];
@@ -68,7 +68,7 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     assert!((turn + 180.0).rem_euclid(360.0) - 180.0 < 1e-6, "{found}");
     let width = number(&found["grasp"]["width_px"]) * 0.564 / 550.0;
     assert!((number(&pose["opening_m"]) - width).abs() < 1e-6, "{found}");
-    // In the photo from which the model was taught, which is vertical, the error is within a pixel, 1.03 mm.
+    // The photo is vertical and the model was taught from it, so the standard deviation is below a pixel, 1.03 mm.
     assert!((0.01..1.03).contains(&number(&pose["sigma_mm"])), "{pose}");
     assert!((0.01..2.0).contains(&number(&pose["sigma_deg"])), "{pose}");
     let told = detect(&[]);

@@ -129,7 +129,7 @@ fn nearest(found: &Detections, i: usize, among: &Detections) -> Option<usize> {
 /// The effects of rounding on the detections of all pictures.
 #[derive(Debug, Default)]
 struct Comparison {
-    /// Number of detections in full precision.
+    /// Number of compared detections in full precision.
     sure: usize,
     /// Number of these that are replaced by a neighbour whose score differs by less than [`TIE`].
     ties: usize,
@@ -154,7 +154,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
             } else {
                 made.ties += 1;
                 let [neighbours, candidates] = &*unsuppressed;
-                // Before rounding, the neighbour that is kept instead had nearly the same score as well.
+                // Before rounding, the neighbour that is kept instead had nearly the same score.
                 let other = nearest(&found, j, neighbours).unwrap();
                 let margin = expected.scores[i] - neighbours.scores[other];
                 println!("a tie: {:.5} and {:.5}", expected.scores[i], neighbours.scores[other]);

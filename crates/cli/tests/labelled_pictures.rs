@@ -170,7 +170,7 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     let html = fs::read_to_string(report.join("index.html")).unwrap();
     assert!(html.contains("000019.png") && html.contains("<svg"), "every picture and a chart are on the page");
 
-    // At 0.5 the sweep equals the totals, and at 1 no detection is accepted.
+    // At 0.5 the sweep equals the totals; at 0 at least as many parts are found.
     let at = |min_score: f64| {
         let swept = evaluated["by_min_score"].as_array().unwrap();
         swept.iter().find(|at| at["min_score"] == json!(min_score)).unwrap()
@@ -253,8 +253,8 @@ fn instance(label: &str, group: u32, x: f64) -> Vec<Value> {
     ]
 }
 
-/// The shipped photo rotated by multiples of 90°, with its marks shifted along their direction by a fraction of their
-/// length, as LabelMe.
+/// Writes the shipped photo rotated by multiples of 90°, with its marks as LabelMe; the grasp is shifted along its
+/// direction by a fraction of its length.
 fn write_turned(folder: &Path, name: &str, quarters: u32, along: f64) {
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
     let mut photo = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();

@@ -35,7 +35,7 @@ fn a_folder_is_played_and_its_part_followed() {
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
     fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
-    // In these three seconds, searches take as long as the machine's load requires.
+    // The stream lasts three seconds, because a search takes longer on a busy machine.
     let from = format!("dir:{}?loop&fps=25", pictures.display());
     let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "75", "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -59,7 +59,7 @@ fn a_folder_is_played_and_its_part_followed() {
     assert!(told.lines().count() == 2 && told.starts_with("frame 0: grasp at ("), "{told}");
 }
 
-/// The demonstration's part at several positions, one after another, and once absent, as PNG.
+/// The demonstration's part at two positions in turn, and once absent, as PNG.
 fn unrelated_pictures() -> Vec<Vec<u8>> {
     let photo = image::open(shipped("pendulum", "image.png")).unwrap();
     let table = RgbImage::from_pixel(photo.width(), photo.height(), *photo.to_rgb8().get_pixel(3, 3));
@@ -141,7 +141,7 @@ fn frames_of_another_size_than_the_regions_are_skipped_and_told_once() {
         let count = pictures.len().to_string();
         let (url, server) = serve(pictures.iter().map(|&picture| picture.clone()).collect());
         let output = sdg(&[&["detect", "--grasp-model", &model, "--from", &url, "--frames", &count], further].concat());
-        // A stream that ends at its first frame leaves requests unanswered.
+        // After an error at the first frame, the server would wait for a request that never comes.
         if output.status.code() == Some(0) {
             server.join().unwrap();
         }

@@ -17,7 +17,7 @@ fn demonstrations(folder: &Folder) -> String {
     };
     copy("pendulum", "lever.png");
     copy("rod_end", "rod_end.png");
-    // Several photos of one part are in a folder that has its name.
+    // A folder with the part's name can contain several photos of it.
     copy("pendulum", "twin/first.png");
     fs::copy(shipped("key", "image.png"), Path::new(&demos).join("unmarked.png")).unwrap();
     demos

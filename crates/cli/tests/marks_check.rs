@@ -91,7 +91,7 @@ fn marks_in_another_reading_are_told_as_that() {
 fn marks_of_another_picture_that_is_there_are_told() {
     let folder = Folder::new();
     let marks = folder.text("marks.json", &marks().to_string().replace("image.png", "other.png"));
-    // The part is in the centre of both pictures, rotated by 180°, so the box fits both.
+    // The part is in the centre of both pictures (rotated by 180° in the second), so the box fits both.
     let convert = |image: &str| run(&["annotation", "convert", &marks, &folder.path("o.json"), "--image", image]);
     fs::copy(shipped("pendulum", "image.png"), folder.path("other.png")).unwrap();
     photo().save(folder.path("renamed.bmp")).unwrap();

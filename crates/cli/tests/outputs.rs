@@ -14,7 +14,7 @@ fn photographed() -> (Folder, String, String) {
     (folder, photo, marks)
 }
 
-/// Asserts that the call fails with one line that contains `part`, and that no file changes.
+/// Asserts that the call fails with a message that contains `part`, and that none of `files` changes.
 fn refused(arguments: &[&str], part: &str, files: &[&str]) {
     let before: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
     let output = sdg(arguments);

@@ -3,7 +3,7 @@
 use crate::support::{Folder, sdg, taught_pendulum};
 use serde_json::Value;
 
-/// Model S of the lever, which is 166 mm long and 16 mm high; the model knows neither size.
+/// Model S of the pendulum, which is 166 mm long and 16 mm high; the model knows neither size.
 fn taught(folder: &Folder) -> String {
     let model = folder.path("model.sdg");
     taught_pendulum(&model, None);
@@ -55,7 +55,7 @@ fn what_the_photo_does_not_show_must_be_told() {
     refused(&["--length-mm", "166"], 2, &["--height-mm", "model.sdg"]);
     refused(&["--length-mm", "166", "--object", "pendulum"], 2, &["cannot be used with"]);
     refused(&["--length-mm", "0", "--height-mm", "16"], 2, &["a size of 1 to 5000 millimetres"]);
-    // A lever as large as a table: no hand opens that wide.
+    // A part as large as a table: no hand opens that wide.
     refused(&["--length-mm", "1600", "--height-mm", "16"], 1, &["opening of the jaws in m: expected 0.001 to 0.08"]);
     refused(&["--length-mm", "166", "--height-mm", "1"], 1, &["height in m: expected 0.003 to 0.12, found 0.0010"]);
 }

@@ -148,7 +148,7 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
         let cell = workcell(&folder, "odd.toml", further);
         grasp(&cell, &["--place", "a"], 1, &["odd.toml", &at(further), expected]);
     }
-    // An obstacle around the robot or at the part's place is named; nothing moves.
+    // An obstacle around the robot, or at the place for the part, is named.
     let hall = workcell(
         &folder,
         "hall.toml",

@@ -141,7 +141,7 @@ fn meaning(arg: &Arg) -> String {
     meaning
 }
 
-/// The text on one line, with characters escaped that Markdown would read as an HTML element.
+/// The text on one line, with `<` and `*` escaped for Markdown.
 fn in_markdown(help: &str) -> String {
     help.split_whitespace().collect::<Vec<_>>().join(" ").replace('<', "\\<").replace('*', "\\*")
 }

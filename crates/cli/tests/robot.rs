@@ -24,7 +24,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// The pendulum taught with the shipped camera; its marks are 16 mm above the table.
+/// The pendulum taught without a camera, or with the shipped one; its marks are then 16 mm above the table.
 fn taught(folder: &Path, with_camera: bool) -> PathBuf {
     let out = folder.join("model.sdg");
     let camera = shipped("workcell/camera.yaml");
@@ -62,7 +62,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert!(soft.status.success() && told.contains("down softly to about 9 mm, or until contact"), "{told}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
-    // The part is drawn in the picture in its colour; about ten millimetres of it are visible at this size.
+    // The part is drawn in its colour.
     let drawn = image::open(out.join("dry-run.png")).unwrap().into_rgb8();
     let is_part = |pixel: &image::Rgb<u8>| pixel[0] > 120 && pixel[0] > pixel[1] + 50 && pixel[1] > pixel[2] + 20;
     let num_part = drawn.pixels().filter(|pixel| is_part(pixel)).count();

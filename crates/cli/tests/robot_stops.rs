@@ -1,5 +1,5 @@
-//! Failures of programs and robots during a motion: the arm stops, one line gives the reason, and the arm does not move
-//! until a person confirms.
+//! Failures of programs and robots during a motion: the arm stops; after a killed program, it does not move until a
+//! person confirms.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};

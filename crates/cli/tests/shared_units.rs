@@ -170,7 +170,7 @@ fn units_done_by_several_processes_make_the_tables_of_one() {
 #[test]
 fn a_missing_simulator_is_told_once_and_before_anything_is_done() {
     let (libraries, folder) = (Folder::new(), Folder::new());
-    // This file is found before the installed library, and is not a library.
+    // These empty files are found before the installed library.
     for name in ["libmujoco.so.2.2.2", "libmujoco.so"] {
         File::create(libraries.path(name)).unwrap();
     }
@@ -192,7 +192,7 @@ fn damaged_results_are_refused(shared: &str) {
     let at = |name: &str| Path::new(shared).join(name);
     let is_refused = |parts: &[&str]| refused(&evaluate(shared, &["--collect"]), 1, parts);
 
-    // Results with another number of pictures, on which the teaching does not depend.
+    // Results made with another number of pictures; teaching does not depend on this number.
     let with_two_views = |more: &[&str]| {
         let mut arguments = arguments(shared, more);
         let views = arguments.iter().position(|argument| *argument == "--views").unwrap();
@@ -210,7 +210,7 @@ fn damaged_results_are_refused(shared: &str) {
     is_refused(&["look-rod_end: duplicate: done by", "1 of 4 units"]);
     fs::remove_file(second).unwrap();
 
-    // One file differs from its receipt, another is missing.
+    // A file differs from its receipt, and then is missing.
     let (file, kept) = (at("cells/S-rod_end.look.json"), at("cells/kept"));
     fs::copy(&file, &kept).unwrap();
     fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
@@ -272,7 +272,7 @@ fn failures_are_recorded_and_told() {
     refused(&ended, 1, &["4 of 4 units have no result"]);
     assert!(String::from_utf8(ended.stdout).unwrap().contains("\nfailed:\n  teach-S-rod_end  2 times, last on "));
 
-    // A running unit, and one whose process was killed.
+    // A unit that is running, and later one whose process was killed.
     fs::remove_dir(&obstacle).unwrap();
     let unit = Path::new(&out).join("units").join(LOOK);
     fs::create_dir_all(&unit).unwrap();
@@ -300,7 +300,7 @@ fn failures_are_recorded_and_told() {
     fs::write(unit.join("running.json"), running).unwrap();
     let gone = "look-rod_end: missing: n7 (process 12, job 31) ended without a result";
     refused(&evaluate(&out, &["--collect"]), 1, &[gone]);
-    // A second try succeeds.
+    // The next try succeeds.
     json(&evaluate(&out, &["--unit", TEACH, LOOK]));
 }
 

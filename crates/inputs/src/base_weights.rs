@@ -69,7 +69,7 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
 /// `tell` receives the report of the conversion before the values are read.
 ///
 /// # Errors
-/// The file cannot be read, the weights are for another network or another image input, or no parameter has a prefix.
+/// The file cannot be read, the weights are for another network or another image input, or a prefix fits no parameter.
 pub fn read(
     path: &Path,
     network: &RcnnConfig,

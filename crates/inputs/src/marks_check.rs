@@ -22,7 +22,7 @@ pub struct MarkedPhoto<'a> {
     pub marks: &'a Path,
     /// The contents of that file.
     pub bytes: &'a [u8],
-    /// The photo's name according to that file.
+    /// The photo's name or path, by which that file's entry for it is found.
     pub file_name: Option<&'a str>,
 }
 

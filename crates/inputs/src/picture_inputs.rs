@@ -60,7 +60,7 @@ pub struct PictureInputs {
 }
 
 /// The pictures of an argument. For a folder: all files with a picture's extension, and also unsupported formats
-/// (HEIC), so that their error is printed. Subfolders are left out.
+/// (such as HEIC), so that their error is printed. Subfolders are left out.
 ///
 /// # Errors
 /// The folder cannot be listed or has no pictures.

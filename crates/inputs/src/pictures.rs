@@ -43,7 +43,7 @@ pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Formats that cannot be read; their error says what to do.
+/// Extensions of picture formats that cannot be read; such a file gives an error and is not skipped.
 pub const UNREADABLE_EXTENSIONS: [&str; 4] = ["heic", "heif", "avif", "gif"];
 
 /// Reads a picture from standard input until its end.

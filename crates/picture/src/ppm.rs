@@ -76,7 +76,7 @@ impl PpmHead {
 /// Decodes the picture at the beginning of the bytes, after `check_size` has accepted its width and height.
 ///
 /// # Errors
-/// Data in place of a complete picture, and the errors of `check_size`.
+/// The data are not a complete picture; the errors of `check_size`.
 pub(crate) fn decode_ppm(
     bytes: &[u8],
     check_size: impl FnOnce(u32, u32) -> Result<(), PictureError>,

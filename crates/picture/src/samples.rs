@@ -18,7 +18,8 @@ pub(crate) fn to_rgb8(picture: DynamicImage) -> RgbImage {
 }
 
 /// Scales samples to the full range. Industrial cameras store 10 and 12 bits in the lower bits of 16; read as 16 bits,
-/// the picture is black. A dark picture that really has 16 bits becomes brighter, which does not affect later steps.
+/// the picture is nearly black. A dark picture that really has 16 bits becomes brighter, which does not affect later
+/// steps.
 fn in_full_range(mut picture: DynamicImage) -> DynamicImage {
     match &mut picture {
         DynamicImage::ImageLuma16(samples) => stretch(samples, 1),

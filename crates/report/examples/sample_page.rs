@@ -1,4 +1,4 @@
-//! A page with every kind of block, filled with made-up numbers and pictures, for working on its style.
+//! A page with most kinds of blocks, filled with made-up numbers and pictures, for working on its style.
 //!
 //! `cargo run --release -p sdg-report --example sample_page -- DIR` writes `DIR/index.html`.
 

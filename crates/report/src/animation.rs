@@ -6,7 +6,7 @@
 //! ```
 //!
 //! All frames use one palette, so that a static background does not flicker. Each frame contains only the rectangle
-//! that changed and is transparent elsewhere: with a fixed camera, only motion needs space.
+//! that changed, with unchanged pixels transparent: with a fixed camera, only motion needs space.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -23,14 +23,14 @@ use crate::error::ReportError;
 pub struct AnimationOptions {
     /// Frames per second as recorded.
     pub source_fps: f64,
-    /// Frames per second as shown; other frames are left out. At most 50, which is the maximum in browsers.
+    /// Maximum number of frames shown per second. Values above 50, which is the maximum in browsers, count as 50.
     pub fps: f64,
     /// Playback speed relative to the recording.
     pub speed: f64,
     /// Maximum width in pixels; wider frames are scaled down.
     pub max_width: u32,
-    /// Maximum size of the file in bytes. To reach it, colours, then frames, then pixels are reduced. If this is not
-    /// enough, the file exceeds the maximum.
+    /// Maximum size of the file in bytes. To reach it, the accuracy of colours, then frames, then pixels are
+    /// reduced. If this is not enough, the file exceeds the maximum.
     pub max_bytes: usize,
     /// Time in seconds for which the last frame is shown before the animation restarts.
     pub hold_last_secs: f64,
@@ -82,7 +82,7 @@ impl Animation {
     }
 }
 
-/// Receives frames one by one and keeps only those that the GIF will show.
+/// Receives frames one by one and keeps only those that the GIF may show.
 #[derive(Debug, Clone)]
 pub struct AnimationRecorder {
     options: AnimationOptions,
@@ -97,7 +97,7 @@ impl AnimationRecorder {
     /// An empty recording.
     ///
     /// # Panics
-    /// If a rate, the speed or the width is not positive.
+    /// If a rate, the speed or the width is not positive, or is infinite.
     #[must_use]
     pub fn new(options: AnimationOptions) -> Self {
         let rates = [options.source_fps, options.fps, options.speed];
@@ -121,7 +121,7 @@ impl AnimationRecorder {
         if found != expected {
             return Err(ReportError::FrameSize { frame_idx: self.num_pushed, expected, found });
         }
-        // Frame k of the recording is shown at time k / (source_fps * speed).
+        // Frame k of the recording belongs at time k / (source_fps * speed).
         let step = (self.options.fps / (self.options.source_fps * self.options.speed)).min(1.0);
         let slot = |count: usize| (count as f64 * step + 1e-9).floor();
         let shown = self.num_pushed == 0 || slot(self.num_pushed) > slot(self.num_pushed - 1);
@@ -165,9 +165,9 @@ impl AnimationRecorder {
 /// Reductions for a smaller file.
 #[derive(Debug, Clone, Copy)]
 struct Economy {
-    /// Number of colours in the palette; one more entry means "unchanged".
+    /// Maximum number of colours in the palette; one more entry means "unchanged".
     num_colors: usize,
-    /// Maximum difference of a channel in pixels that count as unchanged.
+    /// Maximum difference of a channel from the displayed one in pixels that count as unchanged.
     tolerance: u8,
     /// Every `stride`-th frame is kept, and the last one.
     stride: usize,
@@ -300,7 +300,7 @@ struct Palette {
     nearest: HashMap<[u8; 3], u8>,
 }
 
-/// Maximum number of pixels from which the palette is computed.
+/// The palette is computed from at most twice this number of pixels.
 const PALETTE_SAMPLES: usize = 300_000;
 
 impl Palette {
@@ -369,7 +369,7 @@ mod tests {
             .collect()
     }
 
-    /// The frames as shown by a viewer, which draws each over the previous one.
+    /// The frames as displayed, each drawn over the previous one, and their delays.
     fn decode(bytes: &[u8]) -> (Vec<RgbImage>, Vec<u16>) {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);

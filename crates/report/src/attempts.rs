@@ -1,4 +1,4 @@
-//! Grasp attempts as a table and in figures.
+//! Grasp attempts as a table and as a matrix of counts.
 
 use sdg_geometry::median;
 
@@ -8,7 +8,7 @@ use crate::table::{Cell, Column, Table, Tone};
 /// Error of a detection relative to the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectionError {
-    /// Distance of the centres on the table, in millimetres.
+    /// Horizontal distance between the detected and the true grasp, in millimetres.
     pub distance_mm: f64,
     /// Difference of the angles, in degrees.
     pub angle_deg: f64,
@@ -19,9 +19,9 @@ pub struct DetectionError {
 pub struct AttemptSummary {
     /// Number of the attempt, from 1.
     pub number: usize,
-    /// Position of the part in the robot's base frame, x and y in millimetres.
+    /// Position of the part's grasp in the robot's base frame, x and y in millimetres; not finite if unknown.
     pub object_mm: [f64; 2],
-    /// Angle of the part, in degrees.
+    /// Angle of the part's grasp, in degrees; not finite if unknown.
     pub object_angle_deg: f64,
     /// The error of the detection; `None` without a detection.
     pub detection_error: Option<DetectionError>,
@@ -38,7 +38,7 @@ pub struct AttemptSummary {
 /// The table of attempts, with medians at the bottom if there are several. `steps` are the names of the steps in order,
 /// and `done` is the name of success ("held").
 ///
-/// Outcome and step come before the numbers, so that a phone shows them without scrolling.
+/// Outcome and step come before the measurements, so that a phone shows them without scrolling.
 #[must_use]
 pub fn attempts_table(steps: &[&str], done: &str, attempts: &[AttemptSummary]) -> Table {
     let mut table = Table::new(vec![

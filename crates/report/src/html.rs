@@ -2,7 +2,7 @@
 
 /// Escapes text for element content and for quoted attribute values.
 ///
-/// Control characters that HTML forbids are replaced by U+FFFD, so that a damaged label cannot break the page.
+/// Control characters except newline and tab are replaced by U+FFFD, so that a damaged label cannot break the page.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len() + text.len() / 8);

@@ -9,8 +9,8 @@
 //! The page is one file that loads no other files and runs no script: pictures are embedded as base64, charts as inline
 //! SVG. It follows the reader's light or dark theme, adapts to a phone's width, and can be printed.
 //!
-//! Not in this crate: grasp models, simulation and burn. The types are plain data, so that the crate compiles in
-//! seconds and any crate can use it.
+//! Not in this crate: grasp models, simulation and burn. The types are plain data, so that any crate can
+//! use them.
 //!
 //! ```
 //! use image::RgbImage;

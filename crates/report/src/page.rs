@@ -1,4 +1,4 @@
-//! The page: title, key figures and sections, written as one file of limited size.
+//! The page: title, key figures and sections, written as one file.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::table::Tone;
 /// Target size of the page in bytes; photos are compressed to reach it.
 const PAGE_BYTES: usize = 4_000_000;
 
-/// Qualities that are tried in order until the page is small enough; the last one is used in any case.
+/// Qualities that are tried in order until the page is small enough; the last one is used even if it is not.
 const QUALITIES: [PhotoQuality; 4] = [
     PhotoQuality { jpeg: 86, max_width: 1280 },
     PhotoQuality { jpeg: 76, max_width: 1280 },
@@ -94,7 +94,7 @@ impl Report {
         self
     }
 
-    /// Adds a key figure; a row has room for three to five.
+    /// Adds a key figure.
     #[must_use]
     pub fn key_figure(mut self, key_figure: KeyFigure) -> Self {
         self.key_figures.push(key_figure);
@@ -202,7 +202,7 @@ impl Report {
     }
 }
 
-/// The security policy forbids the browser to load any resource, whatever the page contains.
+/// The security policy forbids the browser to load any external resource, whatever the page contains.
 const HEAD_START: &str = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
 <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
 <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\

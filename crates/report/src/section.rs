@@ -46,7 +46,7 @@ impl Section {
         Self { title: title.into(), lead: None, blocks: Vec::new() }
     }
 
-    /// Sets one or two sentences beside the heading that describe the section.
+    /// Sets one or two sentences below the heading: a description of the section.
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = Some(lead.into());
@@ -65,7 +65,7 @@ impl Section {
         self.with(Block::Notice(tone, text.into()))
     }
 
-    /// Adds a picture of full width.
+    /// Adds a picture in its own row.
     #[must_use]
     pub fn figure(self, figure: Figure) -> Self {
         self.with(Block::Figure(figure))

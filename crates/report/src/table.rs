@@ -30,7 +30,7 @@ impl Tone {
 /// The contents of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
-    /// Text, aligned left.
+    /// Text.
     Text(String),
     /// A number with fixed decimals; a dash if it is not finite.
     Number {
@@ -54,7 +54,7 @@ pub enum Cell {
         done: usize,
         /// Total number of steps.
         total: usize,
-        /// Name of the last step.
+        /// Name of the step that was reached.
         label: String,
     },
 }

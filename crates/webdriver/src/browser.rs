@@ -163,8 +163,8 @@ impl Browser {
         self.post("/actions", &json!({"actions": sequences})).map(drop)
     }
 
-    /// Presses a mouse button at the first position of the viewport, moves through the other positions and releases
-    /// it at the last.
+    /// Presses the left mouse button at the first of these positions in the viewport, moves through the others, and
+    /// releases it at the last.
     ///
     /// # Errors
     /// A position is outside the viewport.
@@ -269,7 +269,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The driver closes its browser with the session; without a response, both are killed.
+        // The driver closes its browser with the session, and is then killed.
         let _ = self.send("DELETE", &self.path(""), None);
         let _ = self.driver.kill();
         let _ = self.driver.wait();

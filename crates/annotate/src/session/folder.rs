@@ -1,4 +1,4 @@
-//! The other pictures of a project's folder, which the user adds one by one, and photos added on the page.
+//! The other pictures of a project's folder, which the user can add, and photos added on the page.
 
 use std::path::{Path, PathBuf};
 

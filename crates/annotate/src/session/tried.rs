@@ -49,10 +49,10 @@ impl Session {
         if let Some(id) = self.same_other(name, bytes) {
             return self.add_other_trial(id);
         }
-        // The given name is for display; the file gets its own name.
+        // The given name is for display; the file gets a safe, unused name.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
         let shown: String = name.chars().take(MAX_LABEL_CHARS).collect();
-        // Held until the picture is written, so that its name is taken when the next one is chosen.
+        // The lock is held until the picture is written, so that the next picture gets another name.
         let mut state = self.state();
         let folder = self.uploads(&state);
         std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;

@@ -152,7 +152,7 @@ impl TaughtModel for InPlaceModel {
     }
 }
 
-/// A server for a folder with one photo; stopped when dropped.
+/// A server for a folder; stopped when dropped.
 pub struct Served {
     pub folder: tempfile::TempDir,
     pub port: u16,

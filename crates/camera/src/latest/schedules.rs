@@ -95,7 +95,7 @@ fn every_schedule_gives_what_the_cell_promises() {
     assert_eq!(num_schedules, 3279);
 }
 
-/// A waiting caller is woken by each frame or error of a camera, by the camera's end, and by nothing else.
+/// A waiting caller is woken by a frame and by an error; the camera's end is reported.
 #[test]
 fn a_caller_that_waits_is_woken() {
     for (sent, expected) in [(Some(Some(7)), Ok(Some(7))), (Some(None), Err(())), (None, Ok(None))] {

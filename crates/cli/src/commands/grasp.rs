@@ -282,7 +282,7 @@ fn dry_run<A: Arm>(
     Ok(())
 }
 
-/// Prints the closing lines, or the JSON object.
+/// Prints the closing lines, and with `--json` the JSON object.
 fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
         println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
@@ -327,7 +327,7 @@ fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64,
     }
 }
 
-/// Whether a picture was taken and did not contain the part. If a motion was rejected before, no picture was taken.
+/// Whether a picture was taken and did not contain the part. If the first motion was rejected, no picture was taken.
 fn is_nothing_found(report: &GraspReport) -> bool {
     let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
     is_look && report.targets.last() == Some(&None)

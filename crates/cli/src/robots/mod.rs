@@ -1,4 +1,4 @@
-//! Arms for commands: selection, camera pictures, confirmation, and records after an error.
+//! Arms for commands: selection, simulated scenes, dry runs, confirmation, and records after an error.
 
 mod confirm;
 mod dry_run;

@@ -19,7 +19,7 @@ struct Straight {
     click: Point2<f64>,
 }
 
-/// Evenly spread numbers, the same in every run: steps of the golden ratio.
+/// Evenly spread numbers from 0 to 1, the same in every run: multiples of `step`, modulo 1.
 fn spread(number: usize, step: f64) -> f64 {
     (number as f64 * step).fract()
 }
@@ -88,7 +88,7 @@ fn a_gripper_on_a_straight_part_is_turned_along_its_axis() {
 #[ignore = "make test-browser: needs Chromium"]
 fn a_gripper_on_a_part_with_legs_fits_to_a_degree_in_the_nearer_direction() {
     let page = Page::open();
-    // A body of 120 × 80 px with two legs: its outline has no straight side that is long enough to be followed.
+    // A body of 120 × 80 px with two legs.
     let body = [[-60.0, -40.0], [60.0, -40.0], [60.0, -35.0], [110.0, -35.0], [110.0, -25.0], [60.0, -25.0]];
     let part = body.into_iter().chain(body.into_iter().rev().map(|[x, y]| [x, -y]));
     for angle_deg in [3.0, 17.0, 48.5, 121.0, 166.0f64] {
@@ -154,7 +154,7 @@ fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
     let drawn = || page.browser.run(strokes, &[]).unwrap();
     stroke(corners[0]);
     assert!(has(0) && !has(1));
-    // A step between both strokes.
+    // Another action between the two strokes.
     page.browser.press(&["g"]).unwrap();
     page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
     page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
@@ -184,7 +184,7 @@ fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
     page.assert_quiet();
 }
 
-/// A light plate with a dark shadow to its right, on a grey table.
+/// A light plate with a dark shadow to its lower right, on a grey table.
 fn shaded_plate() -> RgbImage {
     RgbImage::from_fn(640, 480, |x, y| {
         let grain = ((x * 7 + y * 13) % 7) as u8;
@@ -291,7 +291,7 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
         assert!((moved.x - 40.0).abs() < 2.0 && moved.y.abs() < 2.0, "{step}: {moved}");
         assert_eq!(after.outline, before.outline, "{step}");
     }
-    // The outline beside the gripper and the outline's points can still be dragged.
+    // The outline's points can still be dragged.
     page.click("#do-outline h2");
     page.settle();
     let before = page.saved();
@@ -339,10 +339,10 @@ fn a_gripper_under_the_outline_is_taken_by_its_middle_and_ends() {
         assert!(turn.abs() > 5.0, "{end}: {turn}°");
         assert_eq!(kept, outline, "{end}");
     }
-    // Elsewhere, the line still gets a point.
+    // Elsewhere, a drag still adds a point to the outline.
     let (kept, longer) = drag(page.on_screen([250.0, 285.0]), [0.0, 30.0]);
     assert_eq!((kept, longer.vertices.len()), (grasp, outline.vertices.len() + 1));
-    // A point of the outline at the gripper's middle is taken before it.
+    // A point of the outline at the gripper's middle is dragged instead of the gripper.
     page.click("#do-outline h2");
     page.settle();
     let vertex = page.handle("[data-vertex='1'] .knob");

@@ -9,7 +9,7 @@ use sdg_report::{Animation, AnimationOptions, Color, draw_label};
 use super::page::{HOLD, Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
 
-/// Time for which each picture is shown, in seconds.
+/// Time for which each picture is shown, in seconds; the last one is shown longer.
 const STANDS: f64 = 1.8;
 /// Seed of the held-out samples.
 const SEED: &str = "3";

@@ -1,4 +1,4 @@
-//! All actions of the mouse, with keys alone.
+//! Marks made and corrected with keys.
 
 use serde_json::json;
 
@@ -18,7 +18,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let browser = &page.browser;
     let press = |keys: &[&str]| browser.press(keys).unwrap();
 
-    // A box in the centre; first its corner is moved, then the box.
+    // A box in the centre, of which one corner is moved.
     press(&["b"]);
     press(&[ENTER]);
     let start = page.saved().bbox;

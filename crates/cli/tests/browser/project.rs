@@ -134,7 +134,7 @@ fn several_found_ones_have_numbers() {
     }
     page.click("#strip li:nth-child(2) button");
     page.wait_for("the other picture", "return document.getElementById('photo').alt === 'Photo two.png'");
-    // All pictures as files: one line per grasp, or one object per picture.
+    // The detections in all pictures as files: CSV, or JSON with one object per picture.
     let saved = |css: &str| {
         let script = "const made = URL.createObjectURL; let blob;
             URL.createObjectURL = (given) => made.call(URL, (blob = given));

@@ -17,7 +17,7 @@ fn open() -> Page {
     std::fs::copy(shipped_photo(), table.join("a.png")).unwrap();
     std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
     let marks = shipped_photo().with_file_name("annotation.json");
-    // COCO marks are assigned to the photo by its name.
+    // The marks name their photo.
     let text = std::fs::read_to_string(marks).unwrap().replace("image.png", "photo.png");
     std::fs::write(folder.path().join("photo.json"), text).unwrap();
     let page = Page::open_in(folder, &["photo.png", "--from", "dir:table?fps=10&loop"]);

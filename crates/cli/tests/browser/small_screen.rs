@@ -8,7 +8,7 @@ use super::tried::{add, photo, taught};
 
 const STEPS: [&str; 4] = ["mark", "samples", "teach", "try"];
 
-/// Pairs of buttons and labels of the marks that overlap.
+/// Buttons and labels that overlap the button with which their mark is cleared.
 const OVERLAPS: &str = "const items = [...document.querySelectorAll('.todo li')].flatMap((li) =>
     [...li.querySelectorAll('button, label')].filter((e) => e.checkVisibility()).map((e) => [li, e]));
     const meets = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;

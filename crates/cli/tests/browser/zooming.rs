@@ -24,7 +24,7 @@ fn is_in_view(page: &Page, kinds: &[&str]) -> bool {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn zooming_to_a_part_never_shrinks_the_photo_and_follows_the_window() {
-    // Boxes that fill nearly all, most, and a small share of the photo.
+    // Boxes that fill nearly all, almost half, and a small share of the photo.
     let boxes = [[10.0, 10.0, 630.0, 470.0], [100.0, 80.0, 520.0, 400.0], [255.0, 164.0, 392.0, 282.0]];
     for [x1, y1, x2, y2] in boxes {
         let page = Page::open();

@@ -5,7 +5,7 @@
 pub struct Block {
     /// The line of the fence, from 1.
     pub line: usize,
-    /// The language after the fence: `text`, `yaml`, or none for commands.
+    /// The language after the fence, such as `text` or `yaml`; empty, `sh` or `console` for commands.
     pub language: String,
     /// The comment above the block, which gives its requirements or its duration: `<!-- needs: a camera -->`.
     pub marker: Option<Marker>,

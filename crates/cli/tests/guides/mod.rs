@@ -70,7 +70,7 @@ fn fault(root: &Command, words: &[String]) -> Option<String> {
     while command.has_subcommands() {
         let verb = rest.first()?;
         if verb.chars().all(|c| !c.is_ascii_lowercase()) {
-            // VERB, …, or an option of the program itself.
+            // A placeholder, such as VERB or ….
             return None;
         }
         // `camera list|grab|watch` names several verbs.

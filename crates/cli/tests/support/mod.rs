@@ -36,9 +36,8 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
 /// Writes model S of the shipped pendulum, taught with seed 1: with a camera, marks at 16 mm and grasp at 9 mm; or
 /// without a camera.
 ///
-/// Thirty tests need one of the two models, each in its own process, and teaching takes five seconds on one core. The
-/// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy the
-/// file.
+/// Many tests need one of these models (one per camera file), each in its own process, and teaching takes seconds. The
+/// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy it.
 pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taught");
     fs::create_dir_all(&folder).unwrap();

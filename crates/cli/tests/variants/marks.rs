@@ -61,7 +61,7 @@ pub fn lossless(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> Marks {
     marks
 }
 
-/// JSON in a file, in any style and with any name.
+/// JSON in a file, in any style and with one of several names.
 pub fn in_json(dice: &mut Pcg64Mcg, value: &Value, recipe: &str) -> Marks {
     let (bytes, style) = written(dice, value);
     let name = *pick(dice, &["photo.json", "Schl\u{fc}ssel marks.JSON", "marks/a.json", "export.txt", "100%.json"]);

@@ -173,7 +173,7 @@ impl Variant {
     }
 }
 
-/// A model taught from the scene, with which all variants of the picture are searched.
+/// A model taught from the scene, with which variants of the picture are searched.
 fn taught(folder: &Folder) -> String {
     scene().photo.save(folder.path("scene.png")).unwrap();
     let mut dice: Pcg64Mcg = generator_at(0, 1, 0);

@@ -49,7 +49,7 @@ pub fn of_detection(done: &Output, scene: &Scene) -> Option<Outcome> {
     })
 }
 
-/// The marks in a COCO file of the program. Boxes and outlines are compared if there are any.
+/// The marks in a COCO file of the program. Outlines are compared if there are any.
 pub fn of_marks(coco: &[u8], scene: &Scene) -> Outcome {
     let file: Value = serde_json::from_slice(coco).unwrap();
     let annotations = file["annotations"].as_array().unwrap();

@@ -21,7 +21,7 @@ pub struct Photo {
     pub recipe: String,
 }
 
-/// File names of people and systems; the extension of one of them contradicts the content.
+/// File names without extension, as people and systems choose them.
 const STEMS: [&str; 12] = [
     "photo",
     "Schlüssel groß",
@@ -202,7 +202,7 @@ fn ppm(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     named(dice, &["ppm", "PPM"], format!("PPM {head:?}"), [head.as_bytes(), photo.as_raw()].concat())
 }
 
-/// The picture with changed pixels, damaged, or not a picture; and the words of which a refusal may contain one.
+/// The picture with changed pixels, damaged, or not a picture; and the words of which a refusal must contain one.
 pub fn spoilt(dice: &mut Pcg64Mcg, photo: &RgbImage) -> (Photo, &'static [&'static str]) {
     let whole = DynamicImage::from(photo.clone());
     let jpeg = |quality: u8| {

@@ -15,7 +15,7 @@ pub enum Compression {
 #[derive(Debug, Clone)]
 pub struct Tiff {
     pub size: [u32; 2],
-    /// Row by row and channel by channel; a sample's bytes are in the file's byte order.
+    /// Row by row, with interleaved channels; a sample's bytes are in the file's byte order.
     pub samples: Vec<u8>,
     pub num_channels: usize,
     pub bytes_per_sample: usize,

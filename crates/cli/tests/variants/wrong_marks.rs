@@ -68,7 +68,7 @@ fn in_other_units(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wo
         4 => [100.0 * x / width, 100.0 * y / height],
         _ => [x, y],
     };
-    // For a rotated photo, the marks may fit its stored pixels better than either reading.
+    // If the photo has an Exif orientation, the marks may fit its stored pixels best; the error then says "Exif".
     let (recipe, words): (&str, Words) = match kind {
         0 => ("shares", &["shares"]),
         1 => ("half scale, size unknown", &["half scale", "Exif"]),
@@ -166,7 +166,7 @@ fn contradictory(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wor
             ("images of other names", &["images: one.png"])
         }
         _ => {
-            // The photo beside the file shows the part at these marks.
+            // The other photo in the folder shows the part at these marks.
             file = sizeless(coco(dice, super::other_scene(), super::OTHER_PHOTO).0);
             file["images"] = json!([{"id": file["images"][0]["id"], "file_name": super::OTHER_PHOTO}]);
             file["annotations"].as_array_mut().unwrap().retain(|one| one.get("area").is_some());

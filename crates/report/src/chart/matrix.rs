@@ -10,9 +10,9 @@ const ROW_HEIGHT: f64 = 30.0;
 const GAP: f64 = 3.0;
 /// Mean width of a letter in labels, in pixels.
 const LETTER_WIDTH: f64 = 6.4;
-/// Sine and cosine of the angle of headings that are wider than their columns.
+/// Sine and cosine of the angle of slanted headings.
 const SLANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Minimum shade of a cell with a count, so that it is visible.
+/// Minimum shade of a cell with a nonzero count, so that the cell is visible.
 const MIN_SHADE: f64 = 0.16;
 
 /// Counts in rows and columns, drawn as shaded cells, for example a confusion matrix.
@@ -118,7 +118,7 @@ impl Matrix {
         };
         let share = count as f64 / total.max(1) as f64;
         let shade = if count == 0 { 1.0 } else { MIN_SHADE + (1.0 - MIN_SHADE) * share };
-        // In the darker half of the scale, the number is on a dark background (in the dark theme on a light one).
+        // Above this shade, the number is on a dark background (in the dark theme, on a light one).
         let ink = if count > 0 && shade > 0.55 { " on" } else { "" };
         format!(
             "<rect class=\"cell {tone}\" x=\"{:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"3\" \

@@ -41,7 +41,7 @@ impl Axis {
         self
     }
 
-    /// Starts the axis at zero, unless a value is below zero.
+    /// Starts a linear axis at zero, unless a value is below zero.
     #[must_use]
     pub fn from_zero(mut self) -> Self {
         self.from_zero = true;
@@ -86,7 +86,7 @@ impl Series {
         self
     }
 
-    /// A centred running mean over a twentieth of the curve; gaps are kept.
+    /// A centred running mean over about a twentieth of the curve; gaps are kept.
     fn smoothed(&self) -> Vec<(f64, f64)> {
         let reach = (self.points.len() / 40).max(1);
         (0..self.points.len())

@@ -44,7 +44,7 @@ impl FittedScale {
         if from_zero && low > 0.0 {
             low = 0.0;
         }
-        // A span smaller than the rounding errors of the values cannot be divided into ticks.
+        // A span that is zero or tiny relative to the values cannot be divided into readable ticks.
         if high - low <= 1e-9 * low.abs().max(high.abs()).max(1e-300) {
             let room = if high == 0.0 { 1.0 } else { 0.5 * high.abs() };
             (low, high) = (low - room, high + room);
@@ -97,7 +97,7 @@ fn is_drawable(scale: Scale, value: f64) -> bool {
     value.is_finite() && (scale == Scale::Linear || value > 0.0)
 }
 
-/// The smallest of 1, 2, 2.5 and 5 times a power of ten that is at least `least`.
+/// The smallest of 1, 2, 2.5 and 5 times a power of ten that is at least `least`, within 0.1 %.
 fn round_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().map(|factor| factor * power).find(|&s| s >= least * 0.999).unwrap_or(power)

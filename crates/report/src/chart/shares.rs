@@ -22,7 +22,7 @@ struct ShareRow {
     reference: Option<f64>,
 }
 
-/// Fractions in percent as dots with whiskers, each compared with a reference value.
+/// Fractions in percent as dots with whiskers, each with an optional reference value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShareChart {
     title: String,

@@ -39,7 +39,7 @@ impl Chart {
 
     fn to_svg(&self, width: f64, height: f64, class: &str) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points);
-        // A point affects the axes only if it can be drawn on both of them.
+        // A point affects the axes only if both coordinates are finite.
         let both = || points().filter(|(x, y)| x.is_finite() && y.is_finite());
         let x_scale = FittedScale::fit(
             self.x_axis.scale,
@@ -86,7 +86,7 @@ impl Chart {
         svg + "</svg>"
     }
 
-    /// The chart in one sentence, for screen readers.
+    /// The chart in words, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}: {} over {}.", self.title, self.y_axis.title(), self.x_axis.title());
         for series in &self.series {
@@ -115,7 +115,7 @@ impl Chart {
         let x_labels = tick_labels(&plot.x_scale.ticks, &self.x_axis);
         for (&tick, label) in plot.x_scale.ticks.iter().zip(&x_labels) {
             let Some(x) = plot.x(tick) else { continue };
-            // A label that would extend beyond the edge is moved inside.
+            // A label that would extend beyond the right edge is moved inside.
             let half = 0.5 * DIGIT_WIDTH * label.chars().count() as f64;
             let text_x = x.min(width - half - 1.0);
             svg += &format!(
@@ -138,7 +138,7 @@ impl Chart {
     fn references(&self, plot: &Plot) -> String {
         let mut svg = String::new();
         if let Some((y, label)) = self.limit.as_ref().and_then(|(y, label)| Some((plot.y(*y)?, label))) {
-            // The label is at the right end, or left of the moment's line if they would overlap.
+            // The label is at the right end, or left of the moment's line if it would overlap this line and fits there.
             let label_width = LETTER_WIDTH * label.chars().count() as f64;
             let moment = self.moment.as_ref().and_then(|(x, _)| plot.x(*x));
             let right = match moment {
@@ -229,7 +229,7 @@ impl Plot {
     }
 }
 
-/// Keeps the lowest and the highest point in each half pixel; the drawing looks the same as with all points.
+/// Keeps the lowest and the highest point in each column of half a pixel; the drawing looks nearly the same.
 fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     let mut column: Vec<(f64, f64)> = Vec::new();
@@ -254,7 +254,7 @@ fn thin_out(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Labels with as many decimals as the ticks need to be distinguished; powers of ten for long numbers.
+/// Labels with the decimals of the ticks' step; [`plain`] labels for a logarithmic axis and for huge or tiny ticks.
 fn tick_labels(ticks: &[f64], axis: &Axis) -> Vec<String> {
     let largest = ticks.iter().fold(0.0f64, |m, t| m.max(t.abs()));
     if axis.scale == Scale::Logarithmic || largest >= 1e6 || (largest > 0.0 && largest < 1e-3) {
@@ -270,7 +270,7 @@ fn tick_labels(ticks: &[f64], axis: &Axis) -> Vec<String> {
     ticks.iter().map(|&tick| format_number(tick, decimals as usize)).collect()
 }
 
-/// A number with three significant digits, without trailing zeros.
+/// A short number: without trailing zeros after the point, and with an exponent if it is huge or tiny.
 fn plain(value: f64) -> String {
     if !value.is_finite() || value == 0.0 {
         return format_number(value, 0);
@@ -331,7 +331,7 @@ mod tests {
     #[test]
     fn a_curve_starts_and_ends_at_the_corners_of_its_plot() {
         let svg = chart(vec![(0.0, 0.0), (10.0, 10.0)]).to_svg(320.0, 220.0, "narrow");
-        // Labels have two digits: the plot is from x 28 to 306, y 182 to 30.
+        // The longest label has two digits: the plot is from x 28 to 306, y 182 to 30.
         assert!(svg.contains("d=\"M28.0 182.0L306.0 30.0\""), "{svg}");
     }
 

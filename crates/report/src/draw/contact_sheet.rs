@@ -7,13 +7,14 @@ use image::imageops::{self, FilterType};
 const GAP_PX: u32 = 6;
 const GROUND: image::Rgb<u8> = image::Rgb([28, 30, 34]);
 
-/// Arranges pictures in rows of cells. A cell is `cell_width` wide and has the first picture's proportions.
+/// Arranges pictures in rows of cells. A cell is `cell_width` wide, has the proportions of the first picture that is
+/// not empty, and is at most four times as high as wide.
 ///
 /// Each picture is scaled to fit its cell, and centred in it. On a page, use a gallery of separate pictures, which
-/// adapts to the screen's width; a sheet is a single file.
+/// adapts to the screen's width; a sheet is a single file. Without pictures, it is one empty pixel.
 ///
 /// # Panics
-/// If `columns` or `cell_width` is zero. Without pictures, the sheet is one empty pixel.
+/// If `columns` or `cell_width` is zero.
 #[must_use]
 pub fn contact_sheet(images: &[RgbImage], columns: u32, cell_width: u32) -> RgbImage {
     assert!(columns > 0 && cell_width > 0, "a sheet has columns of some width");

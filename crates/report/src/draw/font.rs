@@ -1,7 +1,7 @@
 //! Text as outlines: DejaVu Sans, reduced to the characters of labels.
 //!
-//! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with the characters of
-//! [`CHARACTERS`], `--no-hinting --layout-features='' --notdef-outline`; its licence is in the same folder. Other
+//! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with printable ASCII,
+//! [`CHARACTERS`] and `--no-hinting --layout-features='' --notdef-outline`; its licence is in the same folder. Other
 //! characters are drawn as a box.
 
 use std::sync::LazyLock;

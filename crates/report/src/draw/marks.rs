@@ -10,10 +10,10 @@ use super::{
 };
 use crate::html::format_number;
 
-/// Maximum width of a tag with a word, as a fraction of the width of its box; chosen by eye.
+/// Maximum width of a tag with a word, relative to the width of the detection's box; chosen by eye.
 const MAX_TAG_SHARE: f64 = 2.0;
-/// Maximum height of a tag's capitals, as a fraction of the diagonal of the box, unless this is below the minimum in
-/// pixels; chosen by eye.
+/// Maximum height of a tag's capitals, as a fraction of the diagonal of the detection's box, unless this is below
+/// [`MIN_TEXT_PX`]; chosen by eye.
 const MAX_TEXT_SHARE: f64 = 0.12;
 const MIN_TEXT_PX: f64 = 9.0;
 /// Maximum line width of a gripper, as a fraction of the grasp's width, so that it hides little of a small part's
@@ -70,8 +70,8 @@ pub struct DetectionMark<'a> {
     pub number: Option<u64>,
 }
 
-/// Line width for a picture: 3 pixels at 640 columns, so that marks and tags are readable when a row of the page has
-/// three pictures.
+/// Line width for a picture: 3 pixels if the longer side is 640, so that marks and tags are readable when a row of the
+/// page has three pictures.
 pub fn line_width(image: &RgbImage) -> f64 {
     (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0)
 }
@@ -100,9 +100,9 @@ pub fn draw_demonstration(
     }
 }
 
-/// Draws detections, ordered by decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with score
-/// and verdict. Each tag is at the corner of its detection's box where it covers least of the earlier tags and of the
-/// grasps' middles. Returns the areas of the tags.
+/// Draws detections, given in order of decreasing score: boxes, outlines, keypoints, grasps as grippers, and tags with
+/// score and verdict. Each tag is at the corner of its detection's box where it covers least of the earlier tags and of
+/// the grasps' middles. Returns the areas of the tags.
 ///
 /// A refused detection has a dashed box and no gripper, because it is not grasped.
 pub fn draw_detections(image: &mut RgbImage, marks: &[DetectionMark<'_>]) -> Vec<BoundingBox> {
@@ -229,7 +229,7 @@ mod tests {
             assert!(tags[..i].iter().all(|other| other.intersection(tag) == 0.0), "{tags:?}");
             assert!(marks.iter().all(|mark| !tag.contains(&mark.grasp.unwrap().center())), "{tags:?}");
         }
-        // The best one has the preferred place, above the left corner of its box.
+        // The first tag has the preferred place, above the left corner of its box.
         assert!(tags[0].y2 < 100.0 && (tags[0].x1 - 100.0).abs() < 2.0, "{tags:?}");
     }
 

@@ -1,8 +1,8 @@
 //! Draws marks on pictures: boxes, outlines, keypoints, grasps, labels, contact sheets.
 //!
 //! Coordinates are in pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased and
-//! have a dark halo, so that they are visible on bright and dark backgrounds. Parts outside the picture and coordinates
-//! that are not finite are left out.
+//! by default have a dark halo, so that they are visible on bright and dark backgrounds. Parts outside the picture and
+//! coordinates that are not finite are left out.
 
 mod contact_sheet;
 mod font;
@@ -31,10 +31,10 @@ impl Color {
     pub const VERIFIED: Self = Self([64, 214, 170]);
     /// Colour of refused detections. It differs from [`Color::VERIFIED`] in lightness as well as in hue.
     pub const REFUSED: Self = Self([255, 92, 104]);
-    /// Colour of detections that were not checked.
+    /// Colour of unchecked detections, grasp lines and keypoints.
     pub const NEUTRAL: Self = Self([235, 235, 230]);
 
-    /// Relative luminance, 0 (black) to 1 (white): sRGB weights applied to the encoded values.
+    /// Approximate luminance, 0 (black) to 1 (white): sRGB weights applied to the encoded values.
     fn lightness(self) -> f64 {
         let [r, g, b] = self.0.map(f64::from);
         (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255.0

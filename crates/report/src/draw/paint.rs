@@ -74,7 +74,7 @@ pub(super) fn stroke_translucent(image: &mut RgbImage, polylines: &[Vec<Point2<f
     if !(pen.width.is_finite() && pen.width > 0.0) {
         return;
     }
-    // A wider line would cover the whole picture as well.
+    // At this width, a line through the picture covers all of it.
     let [width, height] = [image.width(), image.height()].map(f64::from);
     let pen = Pen { width: pen.width.min(2.0 * (width + height)), ..*pen };
     let reach = 0.5 * pen.width + 1.0;

@@ -39,7 +39,7 @@ pub fn shade_polygon(image: &mut RgbImage, polygon: &Polygon, color: Color, opac
 
 /// Draws keypoints: discs for visible ones, rings for hidden ones. Unlabelled ones are not drawn.
 ///
-/// The pen's width is the radius of a disc; the dash is ignored.
+/// The pen's width is the radius of a disc or ring; the dash is ignored.
 pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
     for keypoint in keypoints {
         let center = keypoint.point();
@@ -187,8 +187,8 @@ mod tests {
         let mut image = RgbImage::from_pixel(100, 100, GREY);
         let grasp = PlanarGrasp { x: 50.5, y: 50.5, angle: Angle::ZERO, width: 40.0 };
         draw_grasp_jaws(&mut image, &grasp, &Pen::new(RED).width(1.0).without_halo());
-        // The faces are at y = 30.5 and 70.5; they are 2.4 pixels thick outwards, and extend 14 to each side; arrows
-        // extend 9 further outwards.
+        // The faces are at y = 30.5 and 70.5; the jaws are 2.4 pixels thick and extend 14 pixels to each side; the
+        // arrows end 9 pixels outside the faces.
         for (x, y) in [(50, 29), (50, 71), (60, 29), (60, 71), (50, 23)] {
             assert_eq!(image.get_pixel(x, y).0, [255, 0, 0], "({x}, {y})");
         }

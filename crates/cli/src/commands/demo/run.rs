@@ -19,7 +19,7 @@ use crate::teaching_progress::TeachingProgress;
 
 /// Number of test pictures with the part, and number without it.
 const VIEWS: (usize, usize) = (12, 12);
-/// Seed of the test pictures; differs from the seeds of attempts and tests.
+/// Seed of the test pictures, far from the usual seeds of the attempts.
 const VIEWS_SEED: u64 = 7_000_000;
 
 /// Teaches, tests, grasps and writes the report.

@@ -267,7 +267,7 @@ struct PictureRecord {
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     advice: Option<&'static str>,
-    /// Indices in the list of detections of the parts that the jaws would touch.
+    /// Indices, in the list of detections, of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
 }
