@@ -1,4 +1,4 @@
-//! A part taught with one calibrated camera and detected with other cameras: other poses, tilts and lenses.
+//! Parts taught with one calibrated camera and detected with other cameras: other poses, tilts and lenses.
 
 use std::ops::ControlFlow;
 
@@ -120,7 +120,7 @@ fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
 fn assert_other_sizes_are_refused(models: &[(ObjectSpec, GraspModel)]) {
     let mut tried = 0;
     for (part, model) in models {
-        // The kinds alternate; some kinds may not be drawable.
+        // The kinds alternate.
         let kinds = part.look_alike_kinds().unwrap();
         let is_scaled = |number: &u64| matches!(kinds[*number as usize % kinds.len()], LookAlikeKind::Scaled { .. });
         for number in (0..12).filter(is_scaled) {

@@ -208,7 +208,7 @@ fn a_covered_part_is_lost_and_found_again() {
     sequence.assert_followed(0);
 }
 
-/// Maximum median and 95th percentile of the errors in metres: as for `detect` (tests/calibrated_camera.rs).
+/// Maximum median and 95th percentile of the position error; the limits of tests/calibrated_camera.rs.
 const MAX_MEDIAN_MM: f64 = 1.0;
 const MAX_ERROR_MM: f64 = 3.0;
 

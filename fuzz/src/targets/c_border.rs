@@ -53,8 +53,7 @@ pub(super) const C_BORDER: Target = Target {
     },
 };
 
-/// Checks that the last error's text in a buffer of size `room` is complete or truncated, and always
-/// terminated.
+/// Checks that the last error's text is terminated and stays within a buffer of size `room`.
 fn check_last_error(room: usize) {
     let mut buffer = vec![c_char::MAX; room + 1];
     // SAFETY: `room` bytes may be written.
