@@ -1,4 +1,4 @@
-"""The packed crops of pack_train.py on the device, with labels of the cells of look-alikes.
+"""The packed crops of pack_train.py on the device, with labels of the pixels of look-alikes.
 
 Legend: n crops, P parts, S = 160 pixels of a crop's side. Colours are RGB.
 """
@@ -57,7 +57,7 @@ class Crops:
             parts += list(z["parts"] + len(masks))
             kinds += list(z["kinds"])
             visible += list(z["visible"])
-            # A look-alike that the program found has only the name of its difference.
+            # Without the prefix of look-alikes that the program found.
             what += [str(v).replace("found ", "") for v in z["what"]]
             pictures += list(z["pictures"] + num_pictures)
             num_pictures += z["pictures"].max() + 1

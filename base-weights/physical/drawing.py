@@ -66,7 +66,7 @@ def plate(sketch, t, holes=(), slots=(), edge=0.25, z=0.0):
 
 
 def block(x, y, z, dx, dy, dz, r=0.0):
-    """A box at the centre of its lower face, with rounded vertical edges."""
+    """A box with the centre of its lower face at (x, y, z) and rounded vertical edges."""
     solid = b.Pos(x, y, z + dz / 2) * b.Box(dx, dy, dz)
     return b.fillet(solid.edges().filter_by(b.Axis.Z), r) if r else solid
 

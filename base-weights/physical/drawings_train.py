@@ -151,7 +151,7 @@ def draw_print(name, r):
 
 
 def carve_and_raise(r, solid, t):
-    """The solid with pockets and sinks, and its ribs and bosses as (solid, material); `t` is the solid's thickness."""
+    """The solid with pockets and sinks, and its ribs, fins and bosses as (solid, material); `t` is its thickness."""
     raised = []
     for f in r["features"]:
         x, y, a, c = f["x"], f["y"], f["a"], f["b"]

@@ -93,8 +93,8 @@ impl Course {
         }
     }
 
-    /// Prints and compares the fifth tenth and the last; the first four are the start-up. Processor time is compared only
-    /// if every unit does the same work.
+    /// Prints and compares the fifth tenth and the last; the first four are the start-up. Processor time is compared
+    /// only if every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
         let [early, late] = [4, 9].map(|idx| self.tenth(idx));

@@ -1,7 +1,7 @@
 //! Runs a program under ptrace, follows its changes in a folder, and kills it at a given change.
 //!
-//! A seccomp filter stops the program only at the system calls that can change or sync files. It also catches calls that
-//! a library makes without the C library, so no library has to be preloaded.
+//! A seccomp filter stops the program only at the system calls that can change or sync files. It also catches calls
+//! that a library makes without the C library, so no library has to be preloaded.
 
 use std::fs;
 use std::io;
