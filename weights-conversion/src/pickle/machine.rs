@@ -141,7 +141,7 @@ impl Machine<'_> {
         Ok(top)
     }
 
-    /// Everything above the last mark, and the mark.
+    /// Removes the last mark and everything above it, which is returned.
     fn pop_mark(&mut self) -> Result<Vec<Value>> {
         match self.marks.pop() {
             Some(mark) => Ok(self.stack.split_off(mark)),
