@@ -2,7 +2,7 @@
 
 Writes the weights of train_details.py in half precision, with batch norms folded in; for several trainings their mean,
 which is valid if one started from the weights of the other. `--parity` prints the log-odds that the test of
-crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in double
+crates/shape/src/details/network.rs expects: of two generated inputs, with the weights in half and the sums in double
 precision.
 
 Legend: B pairs, N = 128 pixels per side of the input, C = 16 cells per side. The input [B, 8, N, N] is photo RGB, picture

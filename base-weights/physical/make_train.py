@@ -47,7 +47,7 @@ CHANGED_TURNS = range(-6, 7, 2)
 
 
 def limit_lamps():
-    """Keeps 15 of the 28 lamps, because Dr.Jit compiles its kernels for each."""
+    """Keeps 15 of the 28 lamps, because Dr.Jit compiles its kernels once per lamp."""
     scene.SIDE_LAMPS = scene.SIDE_LAMPS[:12]
     scene.OVERHEAD_LAMPS = scene.OVERHEAD_LAMPS[:3]
 

@@ -56,7 +56,7 @@ fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetecti
     let error_deg = (best.pose.yaw.degrees() - truth.direction_rad.to_degrees() + 180.0).rem_euclid(360.0) - 180.0;
     println!("{about}: {error_mm:.2} mm, {error_deg:.2}°, score {:.2}", best.detection.score);
     assert!(error_mm < MAX_ERROR_MM && error_deg.abs() < MAX_ERROR_DEG, "{about}: {error_mm} mm, {error_deg}°");
-    // It is also correct in the picture's own pixels: at the projection of the marks.
+    // The grasp is also correct in pixels of the picture: at the projection of the marks.
     let wrist = shown.view.camera;
     let marks = wrist.intrinsics.unproject(&truth.line.center()).unwrap();
     let expected = camera.intrinsics.project(&marks).unwrap();

@@ -22,7 +22,7 @@ const SEARCH_FRAMES: u32 = 20;
 const MAX_ERROR_PX: f64 = 2.0;
 const MAX_ERROR_DEG: f64 = 2.0;
 const MIN_SHARE: f64 = 0.95;
-/// Maximum number of frames until a reappearing part is found again.
+/// Maximum number of frames until a part that appears is found.
 const MAX_FIND_FRAMES: usize = 100;
 /// Minimum distance from every instance at which a tracked object counts as a different object.
 const ELSEWHERE_PX: f64 = 25.0;
