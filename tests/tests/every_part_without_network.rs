@@ -63,7 +63,7 @@ fn model_s_finds_and_grasps_every_part() {
             camera: None,
             place: None,
         };
-        // In the same way as `run`, without a film.
+        // Like `Rehearsal::run`, without a film.
         let attempts = (1..=NUM_ATTEMPTS as usize).map(|number| rehearsal.attempt(number, None).unwrap().attempt);
         let failures: Vec<_> = attempts.filter(|attempt| !attempt.success).collect();
         println!(

@@ -179,6 +179,6 @@ fn teach(input: &mut Numbers<'_>) -> bool {
     let status = unsafe { sdg_teach(&from, &mut model) };
     check_last_error(usize::from(input.u8()));
     assert_ne!(status, SDG_OK, "expected no photo, found one");
-    // The photo is read last, so a missing photo means that all numbers were accepted.
+    // The photo is read after the numbers are checked, so a missing photo means that they were accepted.
     status == sdg_capi::SDG_ERROR_FILE
 }
