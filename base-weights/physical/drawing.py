@@ -42,7 +42,7 @@ def rounded(sketch, r):
     for radius in (r, r * 0.6, r * 0.3):
         try:
             return b.fillet(sketch.vertices(), radius)
-        except Exception:  # OpenCASCADE raises several types if a radius does not fit
+        except Exception:  # OpenCASCADE raises several types of exception if a radius does not fit
             continue
     return sketch
 

@@ -233,7 +233,8 @@ fn torchvision_resnet(name: &str) -> Option<String> {
     Some(format!("backbone.bottom_up.res{}.{block}.{inner}", layer + 1))
 }
 
-/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`; most norms have only scale (`s`) and shift (`b`).
+/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`. A norm has scale (`s`) and shift (`b`), and possibly a
+/// running mean (`rm`) and variance (`riv`).
 fn caffe2_resnet(name: &str) -> Renamed {
     if name.ends_with("_momentum") || matches!(name, "fc1000_w" | "fc1000_b" | "pred_w" | "pred_b") {
         return Renamed::NotNeeded;
