@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the lines and regions of crates that tests reached, without the lines of the tests.
+"""Prints the percentages of lines and regions of crates that tests reached, without the lines of the tests.
 
 coverage.py ROOT LCOV JSON CRATE…: LCOV and JSON are outputs of `llvm-cov export`, for lines and for regions.
 FILES=1 in the environment: also prints files, with the lines that no test reached.

@@ -16,7 +16,7 @@ mkdir -p "$work"
 rm -rf "$work/profiles"
 
 export CARGO_TARGET_DIR=$work RUSTC_WORKSPACE_WRAPPER=$PWD/scripts/hardening/instrument.sh
-# Names of profiles: one file per process would fill the disk; the processes merge %m into 4 files themselves.
+# One file per process would fill the disk; with %4m the processes themselves merge their counts into 4 files.
 export LLVM_PROFILE_FILE=$work/profiles/%4m.profraw
 packages=(-p sdg-robot -p sdg-fci -p sdg-kinematics -p sdg-simulation)
 if cargo nextest --version >/dev/null 2>&1; then

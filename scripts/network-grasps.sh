@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Complete grasps of every shipped part over TCP and UDP, NETWORK_GRASPS (20) attempts each, compared with the same attempts in one
-# process: in lockstep, and in real time. The example defines a failure.
+# Complete grasps of every shipped part over TCP and UDP, in lockstep and in real time: NETWORK_GRASPS (20) attempts each, compared
+# with the same attempts in one process. The example defines a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

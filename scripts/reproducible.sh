@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds one program twice, in two folders, and compares the files bit for bit: `scripts/reproducible.sh` (hand_checks, a minute) or
-# `scripts/reproducible.sh --workspace --bin sdg` (half an hour, which compiles burn twice). Called with the arguments of `cargo build`.
+# `scripts/reproducible.sh --workspace --bin sdg` (half an hour, as burn is compiled twice). Called with the arguments of `cargo build`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Lists the words of the documents that are neither in a British dictionary nor in docs/site/words.txt, and fails if there are any.
-# Code, addresses, paths, names with digits and comments are left out. Called by `make lint`. `scripts/spelling.sh FILE …` checks these files.
+# Code, comments, addresses, paths and names with digits are left out. Called by `make lint`. `scripts/spelling.sh FILE …` checks these files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

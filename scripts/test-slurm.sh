@@ -114,7 +114,7 @@ while :; do
         rmdir "$work/1/cells/S-${parts[1]}.look.json"
     fi
     if [ -z "$restarted" ] && [ "$done_units" -ge 3 ]; then
-        # Not by SIGKILL: Slurm 22.05 writes its state every few seconds, and may start a task again whose state was not
+        # Not by SIGKILL: Slurm 22.05 writes its state every few seconds, and may start again a task whose state was not
         # written.
         controller=$(cat "$work/run/slurmctld.pid")
         say "the controller is ended (process $controller) and started again"

@@ -32,7 +32,7 @@ rm -rf "$root"
 mkdir -p "$root"/{bin,dev,proc,sys,tmp,modules}
 cp /bin/busybox "$root/bin/"
 cp "$binary" "$root/bin/v4l-test"
-# The libraries of the binary, at the paths where it searches them.
+# The libraries of the binary, at the paths where it looks for them.
 ldd "$binary" | grep -o '/[^ ]*' | while read -r library; do
     mkdir -p "$root$(dirname "$library")"
     cp -L "$library" "$root$library"

@@ -20,8 +20,8 @@ WIDTH, HEIGHT = 640, 480
 class Camera:
     """A perspective camera with radial distortion (coefficient `k1`) that looks at `target` on the table.
 
-    `height` mm times `dist` is its distance from the target, `fov` the horizontal field of view in degrees, `tilt` the
-    angle from the vertical, `azimuth` the tilt's direction, `roll` the rotation about the optical axis, all in degrees.
+    Its distance from the target is `height` (mm) times `dist`. In degrees: `fov` is the horizontal field of view, `tilt`
+    the angle from the vertical, `azimuth` the tilt's direction, `roll` the rotation about the optical axis.
     """
 
     def __init__(self, height, fov, k1, tilt=0.0, azimuth=0.0, dist=1.0, target=(0, 0), roll=0.0):

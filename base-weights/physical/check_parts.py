@@ -63,7 +63,7 @@ def plan(body, cell, mm_per_px):
 
 
 def difference(a, b, picture_a, picture_b):
-    """Minimum over all rotations of the fraction of the two plan views' union that differs in outline, height or colour."""
+    """Minimum over rotations in steps of 3° of the fraction of the views' union that differs in height or colour."""
     least = 1.0
     n = a.shape[0]
     for turn in range(0, 360, 3):

@@ -1,4 +1,4 @@
-"""The packed crops of pack_train.py on the device, with labels of the cells of look-alikes.
+"""The packed crops of pack_train.py on the device, with labels of the pixels of look-alikes.
 
 Legend: n crops, P parts, S = 160 pixels of a crop's side. Colours are RGB.
 """
@@ -18,7 +18,7 @@ HELD_OUT_EVERY = 10  # every tenth part is not used for training
 
 
 def expose(x, inside, valid):
-    """Colours [n, 3, h, w] of one exposure: their mean in the outline is about 0.5; 0 where not valid ([n, h, w])."""
+    """Colours [n, 3, h, w], scaled to one exposure: their mean in the outline is about 0.5; 0 where not valid ([n, h, w])."""
     mean = (x.mean(1) * inside).flatten(1).sum(1) / inside.flatten(1).sum(1).clamp(min=1)
     gain = 0.5 / (mean + 0.02)
     return ((x + 0.02) * gain[:, None, None, None]).clamp(max=2.0) * valid[:, None]
@@ -57,7 +57,7 @@ class Crops:
             parts += list(z["parts"] + len(masks))
             kinds += list(z["kinds"])
             visible += list(z["visible"])
-            # A look-alike that the program found has only the name of its difference.
+            # Removes the prefix of look-alikes that the program found.
             what += [str(v).replace("found ", "") for v in z["what"]]
             pictures += list(z["pictures"] + num_pictures)
             num_pictures += z["pictures"].max() + 1

@@ -39,7 +39,7 @@ def blob(cx, cy, radius):
     cos, sin = torch.cos(turn)[:, None, None], torch.sin(turn)[:, None, None]
     u = dx * cos + dy * sin
     v = -dx * sin + dy * cos
-    # One shape for the batch.
+    # One kind of shape for the whole batch.
     if torch.rand(()) < 0.4:
         distance = torch.maximum(u.abs(), v.abs() / ratio)
     else:

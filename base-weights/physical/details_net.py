@@ -2,7 +2,7 @@
 
 Writes the weights of train_details.py in half precision, with batch norms folded in; for several trainings their mean,
 which is valid if one started from the weights of the other. `--parity` prints the log-odds that the test of
-crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in double
+crates/shape/src/details/network.rs expects: of two generated inputs, with the weights in half and the sums in double
 precision.
 
 Legend: B pairs, N = 128 pixels per side of the input, C = 16 cells per side. The input [B, 8, N, N] is photo RGB, picture
@@ -43,7 +43,9 @@ def cells_inside(inside):
 
 
 def pooled(x, cells, inside):
-    """Inputs of the answer: mean and maximum of each channel, the largest log-odds and the mean odds of cells."""
+    """Inputs of the answer: mean and maximum of channels, and of cells a quarter of the largest log-odds and the
+    mean probability.
+    """
     m = cells_inside(inside)
     largest = torch.where(m, cells, torch.full_like(cells, NO_CELL)).flatten(1).amax(1)
     count = m.flatten(1).sum(1).clamp(min=1)
@@ -52,7 +54,7 @@ def pooled(x, cells, inside):
 
 
 class Head(nn.Module):
-    """The answers: of the cells from the previous channels, of the pair from the last channels and the cells."""
+    """The answers: of each cell from `cell_channels`, of the pair from `channels` of the last layer and the cells."""
 
     def __init__(self, channels, cell_channels):
         super().__init__()
@@ -68,7 +70,7 @@ class Head(nn.Module):
 
 
 class Siam(nn.Module):
-    """Two towers with the same weights, convolutions of their difference, and the head."""
+    """Two towers with the same weights, convolutions of their outputs and of the difference, and the head."""
 
     def __init__(self):
         super().__init__()
@@ -84,7 +86,7 @@ class Siam(nn.Module):
     def forward(self, x):
         """The answer [B] and the cells [B, C, C]."""
         inside, about = x[:, 6], x[:, 6:8]
-        # Photos and pictures are in one batch, so they have the same batch norms.
+        # Photos and pictures are in one batch, so the batch norms have the same statistics for both.
         both = torch.cat([torch.cat([x[:, 0:3], about], 1), torch.cat([x[:, 3:6], about], 1)])
         a, b = self.tower(both).split(len(x))
         x = self.c2(self.c1(torch.cat([(a - b).abs(), a, b], 1)))

@@ -28,7 +28,7 @@ COARSE_SHARE = 0.25  # of pairs whose picture is small, half of them with a smal
 SHADE_SHARE = 0.15  # of pictures with the edge of a shadow
 MAX_RIVAL_COVER = 0.12  # of a look-alike: more may hide the difference
 MAX_COVER = 0.45  # of the part
-LARGE_ERROR_SHARE, LARGE_ERROR = 0.25, 2.5  # of poses
+LARGE_ERROR_SHARE, LARGE_ERROR = 0.25, 2.5  # fraction of poses with a larger error, and its factor
 
 
 @dataclass

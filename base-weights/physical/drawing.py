@@ -42,7 +42,7 @@ def rounded(sketch, r):
     for radius in (r, r * 0.6, r * 0.3):
         try:
             return b.fillet(sketch.vertices(), radius)
-        except Exception:  # OpenCASCADE raises several types if a radius does not fit
+        except Exception:  # OpenCASCADE raises several types of exception if a radius does not fit
             continue
     return sketch
 
@@ -66,7 +66,7 @@ def plate(sketch, t, holes=(), slots=(), edge=0.25, z=0.0):
 
 
 def block(x, y, z, dx, dy, dz, r=0.0):
-    """A box at the centre of its lower face, with rounded vertical edges."""
+    """A box with the centre of its lower face at (x, y, z) and rounded vertical edges."""
     solid = b.Pos(x, y, z + dz / 2) * b.Box(dx, dy, dz)
     return b.fillet(solid.edges().filter_by(b.Axis.Z), r) if r else solid
 

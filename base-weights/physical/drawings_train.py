@@ -19,7 +19,7 @@ from drawing import bar, block, disc, link, polygon, post, profile, rounded, slo
 from meshes import cad, settle, verts
 from prints import Print
 
-THROUGH = 80  # mm, longer than a part is high
+THROUGH = 80  # mm, more than the height of any part
 
 
 def polygon_outline(n, lx, ly):
@@ -151,7 +151,7 @@ def draw_print(name, r):
 
 
 def carve_and_raise(r, solid, t):
-    """The solid with pockets and sinks, and its ribs and bosses as (solid, material); `t` is the solid's thickness."""
+    """The solid with pockets and sinks, and its ribs, fins and bosses as (solid, material); `t` is its thickness."""
     raised = []
     for f in r["features"]:
         x, y, a, c = f["x"], f["y"], f["a"], f["b"]
@@ -206,7 +206,7 @@ def build(r, name):
     if not is_bent:
         try:
             solid = b.chamfer(solid.edges().group_by(b.Axis.Z)[-1], 0.25 + 0.3 * r["edge"])
-        except Exception:  # OpenCASCADE raises several types if a chamfer does not fit
+        except Exception:  # OpenCASCADE raises several types of exception if a chamfer does not fit
             pass
     groups = []
     for s, m in [(solid, r["mat"]), *extra]:

@@ -2,8 +2,8 @@
 
 `sdg evaluate --split FILE --sets DIR --tuned --records RECORDS.jsonl` writes the records. A logistic regression combines
 the sum of the bounded terms with the five terms of the close comparison; each set has the same weight, and so have its
-right and its wrong poses. Each printed line is fitted without the set that it judges; the last line is the fit on all
-sets. Look-alikes other than mirror images are judged but not used for fitting, because no term recognises them yet.
+right and its wrong poses. For the printed counts each set is judged by a fit on the other sets; the last line is the
+fit on all sets. Look-alikes other than mirror images are judged but not used for fitting.
 
 Needs numpy and scikit-learn.
 """

@@ -47,7 +47,7 @@ CHANGED_TURNS = range(-6, 7, 2)
 
 
 def limit_lamps():
-    """Keeps 15 of the 28 lamps, because Dr.Jit compiles its kernels for each."""
+    """Keeps 15 of the 28 lamps, because Dr.Jit compiles its kernels once per lamp."""
     scene.SIDE_LAMPS = scene.SIDE_LAMPS[:12]
     scene.OVERHEAD_LAMPS = scene.OVERHEAD_LAMPS[:3]
 
@@ -62,7 +62,7 @@ class TrainMaker(SetMaker):
     scene_type = quotas.QuotaScene
 
     def __init__(self, number, root, spp, pictures):
-        # The parent's initialiser is not called, because it takes its part from a list.
+        # The parent's initialiser is not called, because it takes the part from a list.
         self.group = Group("train", {}, clutter.TUNE, SEED, {})
         self.name, self.spp, self.only, self.resume = f"r_{number:04d}", spp, None, True
         self.index, self.count = number, pictures
@@ -101,7 +101,7 @@ class TrainMaker(SetMaker):
                 self.looks = self.rivals(rng, r, name)
                 if len(self.looks) >= MIN_LOOKS:
                     return rng
-            except Exception as e:  # OpenCASCADE raises several types if a drawing is impossible
+            except Exception as e:  # OpenCASCADE raises several types of exception if a drawing is impossible
                 print(f"{name}: {e!r}", flush=True)
         raise SystemExit(f"{self.name}: no attempt gave a part")
 

@@ -54,7 +54,7 @@ def bitmap(a, raw=False, wrap="repeat"):
 
 
 class Painter:
-    """Makes the BSDFs of one set; `rng` depends on the set and the material, so a part keeps its surface."""
+    """Makes BSDFs; `rng` depends on the set and the material, so a part keeps its surface."""
 
     def __init__(self, rng):
         self.rng = rng

@@ -1,7 +1,7 @@
 """Parts of revolution, the group `roll`: they rest on the table at any angle about their axis. Choices of the program may
 depend on them.
 
-A part is made on a lathe: sections along x, each with a radius as a function of the position along the axis and the
+A part consists of sections along x, each with a radius as a function of the position along the axis and the
 angle about it, which gives threads their helix and heads their hexagon. The axis is y = z = 0.
 """
 

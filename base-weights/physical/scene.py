@@ -1,7 +1,7 @@
 """Light and scenes for Mitsuba, path tracing and denoising.
 
 Scenes differ only in pictures of one size and in meshes, never in a number that Dr.Jit compiles in; the lamp has one of
-28 positions, and every scene has the same number of meshes. So the kernels are compiled once.
+28 positions, and every scene has the same number of meshes. So the kernels are compiled once per lamp.
 """
 
 import hashlib

@@ -1,8 +1,8 @@
-"""Searches the random parts in their rendered pictures with the program. Usage: search_train.py RENDERED SDG
+"""Searches the rendered pictures for the random parts with the program. Usage: search_train.py RENDERED SDG
 
 RENDERED has the folders of make_train.py, SDG is the program. Writes FOLDER/found.jsonl with all
-detections of `sdg detect --all --json` in the pictures, accepted and refused by model S. The details network compares
-at these poses. A folder that has `found.jsonl` is skipped.
+detections of `sdg detect --all --json` in the pictures, accepted and refused by model S. pack_train.py makes
+crops at these poses, too. A folder that has `found.jsonl` is skipped.
 """
 
 import argparse
@@ -15,7 +15,7 @@ TAUGHT = (0, 4)  # exit statuses of `sdg teach` with which it has written a mode
 
 
 def search(folder, sdg):
-    """Teaches the part from its demonstration and searches it in the folder's pictures."""
+    """Teaches the part from its demonstration and searches the folder's pictures for it."""
     with tempfile.TemporaryDirectory() as scratch:
         model = os.path.join(scratch, "part.sdg")
         demo = f"{folder}/demo.jpg:{folder}/demo.json"

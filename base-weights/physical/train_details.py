@@ -8,7 +8,7 @@ rate falls to nearly 0 by then. OUT.pt gets the mean weights of the last steps, 
 details_net.py exports.
 
 Printed: the areas under the ROC curve of right against wrong poses of the held-out parts, in total, by the difference of
-the look-alikes, and within each part (mean). The held-out parts only determine when to stop.
+the look-alikes, and within each part (mean). The held-out parts are used for nothing else.
 """
 
 import argparse

@@ -4,7 +4,7 @@
 //! ```text
 //! picture ─ every visible part ─┬─ its demonstration, or another picture of it, in nearly its pose   same
 //!                               ├─ the same in a wrong pose                                          different
-//!                               ├─ its look-alike's demonstration, in the look-alike's pose          different
+//!                               ├─ its look-alike's demonstration, in the part's pose                different
 //!                               └─ another part's demonstration, fitted to its box                   different
 //! ```
 
@@ -51,7 +51,7 @@ const NUM_TURNS: usize = 12;
 pub struct ComparisonTask {
     config: ComparisonConfig,
     pictures: Pictures,
-    /// The parameters of an orientation CNN; its first stages are the trunk.
+    /// The parameters of an orientation CNN; its first stages initialise the trunk.
     trunk: StateDict,
 }
 

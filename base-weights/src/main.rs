@@ -64,7 +64,7 @@ enum Command {
         #[arg(long)]
         #[arg(conflicts_with = "base")]
         orientation: Option<PathBuf>,
-        /// Checkpoint of a comparison network; without it, models taught from the weights do not compare.
+        /// Checkpoint of a comparison network; models taught from weights without one do not compare.
         #[arg(long)]
         comparison: Option<PathBuf>,
         /// The file to write.

@@ -40,7 +40,7 @@ const MAX_ROIS_PER_IMAGE: usize = 6;
 pub fn pretrain_config() -> RcnnConfig {
     let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
     config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
-    // One box for all parts has the shape of the box of one part, with which teaching continues.
+    // The layer for one box of all parts has the same shape as the layer for one part, with which teaching continues.
     config.roi_heads.box_head.box_deltas = BoxDeltas::ClassAgnostic;
     // Pictures show several parts: up to half of the ROIs may be on parts.
     config.roi_heads.sampler.positive_fraction = 0.5;

@@ -49,7 +49,7 @@ pub struct Pictures {
     transform: ImageTransform,
     /// Parts whose angle is ambiguous: their keypoints are no targets.
     is_symmetric: Vec<bool>,
-    /// All parts, the smallest first; look-alikes are adjacent.
+    /// All parts, the smallest first.
     by_size: Vec<usize>,
     seed: u64,
 }

@@ -1,5 +1,5 @@
-//! Tests the shipped weights against their hash, their metadata and the figures in the
-//! documents.
+//! Tests the hash, the size and the metadata of the shipped weights, and that every model with a network can start from
+//! them.
 
 use std::path::Path;
 

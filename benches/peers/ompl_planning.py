@@ -14,7 +14,7 @@ import sys
 
 from ompl import base, geometric, util
 
-# As in crates/kinematics/src/limits.rs.
+# As in crates/kinematics/src/arms/panda.rs.
 LOW = [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]
 HIGH = [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]
 SOLVE_SECS = 10.0

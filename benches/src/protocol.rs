@@ -15,7 +15,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-/// Numbers that identify the result: equal if the same work was done.
+/// Numbers that identify the result; those of both sides must agree to 1 %.
 pub type Facts = BTreeMap<String, f64>;
 
 /// The first line of a worker.

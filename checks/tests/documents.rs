@@ -39,7 +39,7 @@ pub fn tracked(pattern: &str) -> Vec<String> {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let files: Vec<String> = String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect();
     assert!(!files.is_empty(), "expected files that match {pattern}, found none: is this a git checkout?");
-    // A file that was deleted and not yet committed is still listed.
+    // A file whose deletion is not yet committed is still listed.
     files.into_iter().filter(|file| root().join(file).exists()).collect()
 }
 

@@ -2,7 +2,7 @@
 //! runs no script, no page is large, every picture is shown, and axe-core finds no fault at the widths of a phone and a
 //! desktop.
 //!
-//! Needs target/site, and for the last test Chromium and axe-core: `make site` provides all of them and runs these
+//! Needs target/site, and for the last test Chromium and axe-core: `make test-site` provides all of them and runs these
 //! tests. Screenshots are kept in target/site-test.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,5 +1,5 @@
-//! Tests the robot's client against peers that make mistakes in everything they send: the client returns errors, does
-//! not panic, and does not exceed its own timeouts.
+//! Tests the robot's client against peers with mistakes in half of their messages: the client returns errors, does not
+//! panic, and does not exceed its own timeouts.
 #![allow(clippy::unwrap_used)]
 
 use std::io::Write;
@@ -20,8 +20,8 @@ use sdg_fuzz::make_mistakes;
 
 const NUM_SESSIONS: usize = 150;
 const TIMEOUT: Duration = Duration::from_millis(50);
-/// Covers a connection, and the start, end and stop of a motion. Each wait has a limit; recovery has the longest one,
-/// which a closed connection shortens.
+/// Covers a connection, and the start, end and stop of a motion. Each wait has a limit; the stop has the longest one
+/// (10 s), which a closed connection shortens.
 const MAX_SESSION: Duration = Duration::from_secs(25);
 
 /// Mutates half of the messages.
@@ -33,7 +33,7 @@ fn maybe_mutated(mut bytes: Vec<u8>, rng: &mut Pcg64Mcg) -> Vec<u8> {
     bytes
 }
 
-/// Accepts clients, answers every request as a robot would, and sends a few states; then disconnects.
+/// Accepts a client, answers each of its requests and then sends a few states; disconnects when the client is silent.
 fn play_robot(listener: &TcpListener, rng: &mut Pcg64Mcg) -> std::io::Result<()> {
     let (mut stream, client) = listener.accept()?;
     stream.set_read_timeout(Some(TIMEOUT))?;

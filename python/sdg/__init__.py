@@ -252,7 +252,7 @@ def teach(
 
     photo: the file of the photo.
     marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file as a dictionary.
-    model: S, which takes seconds, or A, B, C or D, which have a network and take minutes.
+    model: S, which takes seconds, or A, B, C or D, which have a network and take about a minute.
     steps, time_budget_s: maximum steps and seconds of the network's training.
     symmetry: number of angles at which the part looks the same, or "full".
     size_tolerance: minimum and maximum size of the part in a picture, relative to its size in the photo.

@@ -97,7 +97,7 @@ class Detections(list[Detection]):
     """The accepted detections of a picture, best score first."""
 
     refused: list[Detection]
-    """The other detections, best first, each with the reason for its refusal."""
+    """The other detections, best first."""
 
     def __init__(self, found: list[Detection], min_score: float) -> None:
         super().__init__(one for one in found if one.score >= min_score)

@@ -1,4 +1,4 @@
-"""Exceptions. Each message gives the expected and the found value, like the messages of the program."""
+"""Exceptions. Most messages give the expected and the found value, like the messages of the program."""
 
 
 class SdgError(Exception):

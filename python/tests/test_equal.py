@@ -63,7 +63,7 @@ def test_python_equals_rust_and_the_program(
         rust = json.loads(line)
         assert len(rust) == len(records), picture
         for one, other in zip(rust, records):
-            # The reference has no `size`. Both are parsed from the shortest text that represents the number exactly.
+            # The reference has no `size`. Numbers of both are in the shortest text that represents them exactly.
             assert one == {key: value for key, value in other.items() if key != "size"}, picture
 
     options = ["--camera", made_pictures.CAMERA] if camera else []

@@ -69,7 +69,7 @@ def test_speed_of_two_threads_is_printed(shape_model: sdg.GraspModel) -> None:
     print(
         f"\ntwo threads detect at {2 * one / two:.2f} times the speed of one; a picture takes "
         f"{1e3 * of_one / NUM_PICTURES:.1f} ms of a processor with one thread, {1e3 * of_two / (2 * NUM_PICTURES):.1f} with two; "
-        # If others use the machine, the ratio is meaningless: Linux may share processors by groups of programs, not by threads.
+        # If others use the machine, the ratio is meaningless: Linux may distribute processor time by groups of programs, not by threads.
         f"one had {of_one / one:.2f} processors, two {of_two / two:.2f}"
     )
 

@@ -23,7 +23,7 @@ scripts/build.sh --bin hardening
 
 if [ -z "${SHOW:-}" ]; then
     rm -f "$out"/*.profraw "$out"/figures/*
-    # Counters make the program many times slower, so executions that take too long are not counted as failures.
+    # Counters make the program many times slower, so failures, such as executions that take too long, do not end this script.
     # shellcheck disable=SC2086 # names of targets
     LLVM_PROFILE_FILE="$PWD/$out/%p.profraw" "$out/hardening" --executions "${EXECUTIONS:-20000}" --seconds "${COVERAGE_SECONDS:-400}" \
         --out "$out/figures" ${TARGETS:-} || echo "coverage: there are failures, listed above"

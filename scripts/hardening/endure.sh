@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Endurance tests in sections; each resumes an earlier run or stops at its time limit. docs/testing.md has the figures.
+# Endurance tests in sections; crash resumes an earlier run, soak and robot stop at a time limit. docs/testing.md has the figures.
 #
 #   endure.sh [SECTION…]   crash, refusals, soak, robot, limits, mutants; without a section, the first four
 #   QUICK=1                only a few repetitions of each

@@ -4,7 +4,7 @@
 #   sync        files are flushed before they get their names, checked by strace
 #   coverage    which lines of the readers the input reaches (coverage.sh)
 #   guards      each guard is broken once, and the tests that notice it are printed (guards.py)
-#   address, thread   unit tests under AddressSanitizer and ThreadSanitizer (sanitizers.sh)
+#   address, thread   tests of some crates under AddressSanitizer and ThreadSanitizer (sanitizers.sh)
 # QUICK=1 runs input for two minutes, and sync.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

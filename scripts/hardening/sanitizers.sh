@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs unit tests under a sanitizer: `scripts/hardening/sanitizers.sh address` or `thread`, for the crates in PACKAGES. The compiler accepts the option
+# Runs tests under a sanitizer: `scripts/hardening/sanitizers.sh address` or `thread`, for the crates in PACKAGES. The compiler accepts the option
 # with RUSTC_BOOTSTRAP. For threads the standard library is also compiled, by Debian's compiler, which has its source; LLVM's runtime is used,
 # because Debian's compiler has none.
 set -euo pipefail
@@ -22,7 +22,7 @@ if [ "$kind" = thread ]; then
     RUSTFLAGS+=" -Clink-arg=-lrt -Clink-arg=-lm -Clink-arg=-ldl -Clink-arg=-lpthread -Clink-arg=-lc"
     RUSTFLAGS+=" -Clink-arg=-fuse-ld=lld -Clink-arg=-B$llvm/bin"
 fi
-# A limited file size raises a signal that ends the sanitizer's own report. Leaks are ignored, because threads outlive their tests.
+# Leaks are ignored, because threads outlive their tests.
 export ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=halt_on_error=0
 for package in $packages; do
     "$cargo" test --release --locked "${build_std[@]}" --target "$host" --package "$package" --lib --tests

@@ -1,6 +1,6 @@
 # Names of packages for ARCH (amd64 by default, or arm64), and the command that runs its programs on this machine; to be sourced.
 #   arch      Debian's name          machine  the kernel's
-#   triple    Rust's                 program  the folder of the program that packages hold
+#   triple    Rust's                 program  the folder of the packaged program
 #   emulated  a command before the program: qemu, if this machine is of another kind
 
 arch=${ARCH:-amd64}

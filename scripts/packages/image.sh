@@ -21,7 +21,7 @@ mkdir -p "$work/layer/data"
 
 scripts/oci_system.sh "$layout" "$version" "$work"
 scripts/packages/lay_out.sh "$work/layer/usr"
-# Numbers, not names, because there is no account, and `--user` accepts any other number. Everyone can write to the folder.
+# User and group are numbers, because the image has no account. `--user` accepts any number, so everyone may write to the folder.
 chmod 1777 "$work/layer/data"
 tar --create --owner=0 --group=0 --numeric-owner --sort=name --file "$work/sdg.tar" -C "$work/layer" usr data
 umoci raw add-layer --image "$layout:$version" "$work/sdg.tar"
@@ -37,7 +37,7 @@ if ! unshare --mount --net --pid --fork true 2>/dev/null; then
     exit 0
 fi
 umoci unpack --image "$layout:$version" "$work/bundle" >/dev/null
-# A container must be started with the image's own configuration.
+# Checks the configuration with which a container is started.
 config=$work/bundle/config.json
 [ "$(python3 -c 'import json, sys; process = json.load(open(sys.argv[1]))["process"]; print(process["user"]["uid"], process["cwd"], process["args"][0])' "$config")" = \
     "1000 /data /usr/bin/sdg" ]
@@ -51,7 +51,7 @@ unshare --mount --net --pid --fork bash -euc '
     seconds() { echo "$(date +%s.%N) - $2" | bc | cut -c 1-5; }
     echo "image: from starting to the grasp drawn on a photo: $(seconds "$@") s"
     in_image "$1" /usr/bin/sdg rehearse --object pendulum --grasp-model pendulum.sdg --attempts 1 --out report | tail -1
-    # The page, with the only network that a container has in common with its host: the loopback interface.
+    # The page, over the loopback interface.
     ip link set lo up
     in_image "$1" cp /usr/share/single-demo-grasp/pendulum/image.png photo.png
     in_image "$1" timeout 60 /usr/bin/sdg annotate --no-browser --json photo.png >"$1/data/address" &

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the packages' program `sdg` into target/packages/program/ARCH, for ARCH=amd64 or arm64 with glibc 2.31 or later. Only the C
-# library is linked; the commands that simulate load MuJoCo and EGL.
+# library and libgcc_s are linked; the commands that simulate load MuJoCo and EGL.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh

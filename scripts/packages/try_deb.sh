@@ -9,7 +9,7 @@ root=$(realpath -m target/packages/deb-root)
 scripts/packages/clean_root.sh bookworm "$root"
 cp "$deb" "$root/sdg.deb"
 cp scripts/packages/first_grasp.sh "$root/first_grasp.sh"
-# All files except the records of apt and dpkg.
+# All files outside /var, /tmp and /home.
 files() { find "$root" -xdev \( -path "$root/var/*" -o -path "$root/tmp" -o -path "$root/home" \) -prune -o -print | sort; }
 inside() { unshare --mount --net --pid --fork chroot "$root" "$@"; }
 

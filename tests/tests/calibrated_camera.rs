@@ -1,4 +1,4 @@
-//! A part taught with one calibrated camera and detected with other cameras: other poses, tilts and lenses.
+//! Parts taught with one calibrated camera and detected with other cameras: other poses, tilts and lenses.
 
 use std::ops::ControlFlow;
 
@@ -56,7 +56,7 @@ fn assert_found(shown: &AxisView, camera: &PosedCamera, found: &[PlanViewDetecti
     let error_deg = (best.pose.yaw.degrees() - truth.direction_rad.to_degrees() + 180.0).rem_euclid(360.0) - 180.0;
     println!("{about}: {error_mm:.2} mm, {error_deg:.2}°, score {:.2}", best.detection.score);
     assert!(error_mm < MAX_ERROR_MM && error_deg.abs() < MAX_ERROR_DEG, "{about}: {error_mm} mm, {error_deg}°");
-    // It is also correct in the picture's own pixels: at the projection of the marks.
+    // The grasp is also correct in pixels of the picture: at the projection of the marks.
     let wrist = shown.view.camera;
     let marks = wrist.intrinsics.unproject(&truth.line.center()).unwrap();
     let expected = camera.intrinsics.project(&marks).unwrap();
@@ -120,7 +120,7 @@ fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
 fn assert_other_sizes_are_refused(models: &[(ObjectSpec, GraspModel)]) {
     let mut tried = 0;
     for (part, model) in models {
-        // The kinds alternate; some kinds may not be drawable.
+        // The kinds alternate.
         let kinds = part.look_alike_kinds().unwrap();
         let is_scaled = |number: &u64| matches!(kinds[*number as usize % kinds.len()], LookAlikeKind::Scaled { .. });
         for number in (0..12).filter(is_scaled) {

@@ -22,7 +22,7 @@ const MAX_DISTANCE: f64 = 1.0 / 15.0;
 const MAX_TURN_DEG: f64 = 10.0;
 
 /// Bounds for the network alone. Measured with seed 1, edge preset from the shipped weights, at most 120 steps: 31 hits
-/// and no false alarm. Before features were compared in finer views: 29 and 1. From random initialisation: 29 and 5
+/// and no false alarm. Before the comparison network used finer views: 29 and 1. From random initialisation: 29 and 5
 /// after 300 steps, 2 and 39 after 100.
 const MIN_HITS: usize = 27;
 const MAX_FALSE_ALARMS: usize = 2;

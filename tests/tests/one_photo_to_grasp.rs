@@ -60,7 +60,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
         camera: None,
         place: None,
     };
-    // In order, in the same way as `run`, without a film.
+    // In order, like `Rehearsal::run`, without a film.
     let attempts = (1..=10).map(|number| rehearsal.attempt(number, None).unwrap().attempt);
     let failures: Vec<_> = attempts.filter(|attempt| !attempt.success).collect();
     println!("grasped in {} of 10, failures {failures:?}", 10 - failures.len());

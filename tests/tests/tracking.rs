@@ -22,7 +22,7 @@ const SEARCH_FRAMES: u32 = 20;
 const MAX_ERROR_PX: f64 = 2.0;
 const MAX_ERROR_DEG: f64 = 2.0;
 const MIN_SHARE: f64 = 0.95;
-/// Maximum number of frames until a reappearing part is found again.
+/// Maximum number of frames until a part that appears is found.
 const MAX_FIND_FRAMES: usize = 100;
 /// Minimum distance from every instance at which a tracked object counts as a different object.
 const ELSEWHERE_PX: f64 = 25.0;
@@ -208,7 +208,7 @@ fn a_covered_part_is_lost_and_found_again() {
     sequence.assert_followed(0);
 }
 
-/// Maximum median and 95th percentile of the errors in metres: as for `detect` (tests/calibrated_camera.rs).
+/// Maximum median and 95th percentile of the position error; the limits of tests/calibrated_camera.rs.
 const MAX_MEDIAN_MM: f64 = 1.0;
 const MAX_ERROR_MM: f64 = 3.0;
 

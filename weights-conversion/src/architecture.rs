@@ -94,7 +94,7 @@ pub struct Heads {
     pub num_classes: usize,
     /// Position of the background class.
     pub background: Background,
-    /// Box deltas for each class, or one set for all.
+    /// Whether each class has its own box deltas.
     pub class_specific_boxes: bool,
     /// The keypoint head, if there is one.
     pub keypoint: Option<KeypointHead>,

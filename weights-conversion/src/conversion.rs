@@ -46,12 +46,11 @@ pub struct Conversion {
 impl Conversion {
     /// Finds a tensor for every parameter of the network, except the parts that keep their initial values.
     ///
-    /// A part is named by the prefix of its parameters' names, such as `roi_heads.box_predictor`. The result may
-    /// be incomplete: see [`Self::complete`].
+    /// A part is named by the prefix of its parameters' names, such as `roi_heads.box_predictor`. A backbone alone
+    /// fills only the backbone of a detector. The result may be incomplete: see [`Self::complete`].
     ///
     /// # Errors
-    /// Names of an unknown scheme; a part to re-initialise that the network lacks. A backbone alone for a detector as
-    /// target is not an error: only the backbone is filled.
+    /// Names of an unknown scheme; a part to re-initialise that the network lacks.
     pub fn plan(checkpoint: &Checkpoint, target: &Architecture, reinitialized: &[String]) -> Result<Self> {
         let naming = naming_of(checkpoint)?;
         let mut expected = target.parameters();

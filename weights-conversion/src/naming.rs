@@ -56,7 +56,7 @@ impl fmt::Display for Naming {
 }
 
 impl Naming {
-    /// Recognises the scheme by names that no other scheme has.
+    /// Recognises the scheme by typical names, which are checked in order.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
         let any = |test: &dyn Fn(&str) -> bool| names.clone().any(test);
         if any(&|n| n.starts_with("backbone.fpn.fpn_")) {
@@ -233,7 +233,8 @@ fn torchvision_resnet(name: &str) -> Option<String> {
     Some(format!("backbone.bottom_up.res{}.{block}.{inner}", layer + 1))
 }
 
-/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`; its norms have only scale (`s`) and shift (`b`).
+/// Caffe2 writes `res2_0_branch2a_w` and `res2_0_branch2a_bn_s`. A norm has scale (`s`) and shift (`b`), and possibly a
+/// running mean (`rm`) and variance (`riv`).
 fn caffe2_resnet(name: &str) -> Renamed {
     if name.ends_with("_momentum") || matches!(name, "fc1000_w" | "fc1000_b" | "pred_w" | "pred_b") {
         return Renamed::NotNeeded;

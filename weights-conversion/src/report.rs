@@ -77,7 +77,7 @@ impl Report {
         }
     }
 
-    /// The lines of all names except those that were applied unchanged.
+    /// The lines of all names except the parameters that a tensor filled.
     pub fn exceptions(&self) -> impl fmt::Display {
         Exceptions(self)
     }
@@ -105,7 +105,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// The report without the names that were applied unchanged.
+/// The report without the parameters that a tensor filled.
 struct Exceptions<'a>(&'a Report);
 
 impl fmt::Display for Exceptions<'_> {

@@ -309,7 +309,7 @@ mod tests {
     fn a_transposed_view_is_read_in_its_own_order() {
         let mut source = source_of(&[9.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         let storage = source.whole();
-        // Rows of 3 as stored; the view goes down the columns.
+        // Stored in rows of 3; the view is the transposed matrix.
         let view = StoredTensor::view("t", vec![3, 2], vec![1, 3], 1, ElementType::F32, storage).unwrap();
         assert_eq!(view.values(&mut source).unwrap(), [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]);
         let payload = Payload { span: Span { offset: 4, len: 24 }, encoding: Encoding::Raw };

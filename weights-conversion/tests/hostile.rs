@@ -46,7 +46,8 @@ fn code_is_refused_by_name_wherever_it_stands() {
             assert_refused("legacy", legacy(&pickle, &[]), &["refused", &full_name]);
         }
     }
-    // Other kinds of calls: instances by class name, extension codes, external buffers, persistent ids as text.
+    // Unsupported operations: instances by class name, extension codes, external buffers, persistent ids and numbers as
+    // text.
     for operation in [&b"(iposix\nsystem\n"[..], b"(cnumpy\ndtype\no", b"\x82\x01", b"\x97", b"Pid\n", b"I1\n", b"\x92"]
     {
         assert_refused("operation", dict_with("weight", operation), &["an operation that weights need"]);
@@ -110,7 +111,7 @@ fn nesting_and_loops_end() {
     assert_refused("own model", own_model, &["tensors by name", "none"]);
     let own_shape = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R(K\x01]q\x00h\x00ah\x00\x89h\x00tb";
     assert_refused("own shape", dict_with("w", own_shape), &["sizes", "a tuple or list"]);
-    // A long list from which a dict is made repeatedly; five times, so that even accepting it would cost no memory.
+    // A long list from which a dict is made repeatedly: only five times, so that accepting it would take little memory.
     let pair = cat(&[&text("k"), b"N\x86q\x01"]);
     let list = cat(&[&pair, b"]q\x00(", &b"h\x01".repeat(100_000), b"e"]);
     let copies = b"ccollections\nOrderedDict\nh\x00\x85R".repeat(5);

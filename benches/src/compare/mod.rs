@@ -27,7 +27,7 @@ pub struct CompareArgs {
     /// Run only this work; repeat for several
     #[arg(long, value_name = "WORK")]
     only: Vec<String>,
-    /// Maximum number of rounds of a work; each side runs once per round
+    /// Maximum number of rounds of a work; each side runs at least once per round
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
     /// Fewer rounds and no teaching: for a quick look, not for publication

@@ -113,7 +113,7 @@ pub fn sampled(detector: &GeneralizedRcnn, images: &[TransformedImage], target: 
     facts([("rois", rois.len() as f64), ("head_rois", positive as f64)])
 }
 
-/// The boxes of a target in pixels of the resized image; the sampler uses only them.
+/// The boxes of a target, in pixels of the resized image, and its labels; the sampler uses nothing else.
 fn resized(image: &TransformedImage, target: &Target) -> ResizedTarget {
     ResizedTarget {
         boxes: target.boxes.iter().map(|of_part| image.resized_box(of_part)).collect(),

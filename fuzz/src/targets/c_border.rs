@@ -53,8 +53,7 @@ pub(super) const C_BORDER: Target = Target {
     },
 };
 
-/// Checks that the last error's text in a buffer of size `room` is complete or truncated, and always
-/// terminated.
+/// Checks that the last error's text is terminated and stays within a buffer of size `room`.
 fn check_last_error(room: usize) {
     let mut buffer = vec![c_char::MAX; room + 1];
     // SAFETY: `room` bytes may be written.
@@ -180,6 +179,6 @@ fn teach(input: &mut Numbers<'_>) -> bool {
     let status = unsafe { sdg_teach(&from, &mut model) };
     check_last_error(usize::from(input.u8()));
     assert_ne!(status, SDG_OK, "expected no photo, found one");
-    // The photo is read last, so a missing photo means that all numbers were accepted.
+    // The photo is read after the numbers are checked, so a missing photo means that they were accepted.
     status == sdg_capi::SDG_ERROR_FILE
 }

@@ -1,4 +1,4 @@
-//! HTTP between cameras and this program: answers of a camera's server, and requests of a browser to the live page.
+//! HTTP: answers of a camera's server, and requests of a browser to the live page.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
@@ -20,7 +20,7 @@ const TIMEOUT: Duration = Duration::from_secs(2);
 /// The client for cameras: motion JPEG and single pictures, redirects and authentication challenges, over TCP.
 pub(super) const HTTP_CAMERA: Target = Target {
     name: "http_camera",
-    // The program's own limit: eight bytes for each of 210 megapixels, and a picture's 32 MiB.
+    // The program's own limit: eight bytes for each of 210 megapixels, and 32 MiB of an encoded picture.
     max_extra_bytes: 1_720_000_000,
     quick_executions: 1_000,
     dictionary: &[

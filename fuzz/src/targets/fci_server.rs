@@ -128,7 +128,7 @@ fn cycle(robot: &mut RobotCore, hand: &mut HandCore, plant: &mut FreeArm, comman
     assert!(!state.encode(VERSION).is_empty() && !hand.state(plant).encode().is_empty());
 }
 
-/// Joints of inertia 1 without gravity, with a fixed flange; it panics on torques beyond a motor's limits.
+/// Joints of inertia 1 without gravity, with the Panda's flange; panics on torques beyond a motor's limits.
 #[derive(Debug)]
 struct FreeArm {
     q: JointVector,

@@ -1,4 +1,4 @@
-//! The annotation page's server: HTTP, its guard, every route, over TCP.
+//! The annotation page's server: HTTP, its guard and its routes, over TCP.
 
 use std::net::{Ipv4Addr, TcpStream};
 use std::ops::ControlFlow;
@@ -50,7 +50,7 @@ const DICTIONARY: &[&[u8]] = &[
     NEXT_REQUEST,
 ];
 
-/// A page with a photo, a camera and trial pictures.
+/// A page with a photo, a camera and a trial picture.
 pub(super) const PAGE: Target = Target {
     name: "page",
     max_extra_bytes: MAX_EXTRA_BYTES,
@@ -282,7 +282,7 @@ impl LivePictures for Still {
     }
 }
 
-/// A teacher that always fails: models have targets of their own.
+/// A teacher that teaches and opens no model: models have targets of their own.
 struct Unwilling;
 
 const REFUSED: &str = "nothing is taught here";

@@ -8,7 +8,7 @@ use crate::target::Target;
 
 const MAX_EXTRA_BYTES: usize = 16 << 20;
 
-/// A camera file whose table is given relative to the robot's base.
+/// The section `table` of a camera file, relative to the robot's base.
 const OVER_BASE: &[u8] = b"
 table:
   frame: base

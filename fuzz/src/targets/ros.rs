@@ -6,7 +6,7 @@ use sdg_ros2::{Transforms, camera_info, cdr, encoding, found};
 
 use crate::target::Target;
 
-/// Every message that the node receives.
+/// Messages that the node receives, and some that it sends.
 pub(super) const CDR: Target = Target {
     name: "ros2",
     max_extra_bytes: 160 << 20,
@@ -16,7 +16,7 @@ pub(super) const CDR: Target = Target {
     run: |bytes| read_all(bytes, &mut Transforms::new(0.5)) > 0,
 };
 
-/// Reads bytes as every message that the node receives, and uses the results.
+/// Reads bytes as each of these messages, and uses the results.
 fn read_all(bytes: &[u8], transforms: &mut Transforms) -> usize {
     let mut num_read = 0;
     if let Ok(image) = cdr::from_bytes::<Image>(bytes) {

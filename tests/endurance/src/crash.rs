@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! folder with inputs ─ the command, traced, killed before change k ─ the folder as the disk holds it ─ inputs unchanged? output
-//! old or new, and complete? ─ the command again: it succeeds
+//! none, old or new, and complete? ─ the command again: it succeeds
 //! ```
 
 use std::fs::{self, OpenOptions};
@@ -24,12 +24,12 @@ use crate::tracer::{Ending, Tracee};
 /// Kills a command until `kills` kills are in the log, including those of earlier calls, and prints a summary.
 ///
 /// # Errors
-/// A run without a kill that fails; at least one kill that loses or damages a file.
+/// The run without a kill fails; a kill loses or damages a file; the command fails when it is run again after a kill.
 pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Result<()> {
     let work = places.work.join("crash").join(scenario.name().replace(' ', "-"));
     fs::create_dir_all(&work)?;
     let log = work.join(format!("kills-{seed}.jsonl"));
-    // An earlier call that was cut off leaves a damaged last line.
+    // An earlier call that was cut off may leave a damaged last line.
     let lines: Vec<Value> = match fs::File::open(&log) {
         Ok(file) => BufReader::new(file).lines().map_while(|line| serde_json::from_str(&line.ok()?).ok()).collect(),
         Err(_) => Vec::new(),
@@ -169,7 +169,7 @@ fn judge(
     after: &Path,
 ) -> Result<(&'static str, usize)> {
     let output = scenario.output().map(Path::new);
-    // The page rewrites only the marks.
+    // Of the inputs, the page rewrites only the marks.
     let is_written =
         |file: &Path| Some(file) == output || scenario == Scenario::Annotate && file.ends_with("photo.json");
     for (file, content) in before {

@@ -109,7 +109,7 @@ impl Disk {
                 }
             }
         }
-        // A new folder is empty until its names are synced.
+        // The durable state of a new folder is empty until the folder is synced.
         let is_root = inode == self.root_inode;
         let first = || Folder { states: if is_root { vec![] } else { vec![Names::new()] }, durable: 0 };
         let folder = self.folders.entry(inode).or_insert_with(first);
@@ -170,7 +170,7 @@ fn files_of(names: &Names) -> Vec<u64> {
     names.values().filter_map(|entry| if let Entry::File(inode) = entry { Some(*inode) } else { None }).collect()
 }
 
-/// A random state of a file on the disk whose content `synced` was durable and whose content `written` was not synced.
+/// A random state, on the disk, of a file with the durable content `synced` and the later, unsynced content `written`.
 fn part_of(written: &[u8], synced: &[u8], random: &mut impl Rng) -> Vec<u8> {
     const BLOCK_BYTES: usize = 4096;
     match random.random_range(0..4) {

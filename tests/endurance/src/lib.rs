@@ -1,6 +1,7 @@
-//! Endurance tests of `make endure`, each resumable, on Linux for x86-64 only.
+//! Endurance tests of `make endure`, on Linux for x86-64 only.
 //!
-//! - [`crash`]: commands killed at random moments under [`tracer`]; [`disk`] loses unsynced data.
+//! - [`crash`]: commands killed at random moments under [`tracer`]; [`disk`] loses unsynced data. A later call resumes
+//!   the run.
 //! - [`refusals`]: the same commands on a full or read-only disk, without free descriptors, or while the clock is set
 //!   back.
 //! - [`soak`]: long runs of live detection, of the page, and of a camera that disconnects.

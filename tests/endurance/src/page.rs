@@ -1,4 +1,4 @@
-//! The requests of the annotation page, as a browser sends them.
+//! Sends the requests of the annotation page, with the token in the header `Authorization`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -65,8 +65,8 @@ impl Page {
         Ok(serde_json::from_slice(&self.ask(method, path, body)?)?)
     }
 
-    /// Does a user's session: opens the page, moves the grasp by half a pixel, names the part, adds a picture, teaches
-    /// model S and tests it.
+    /// Does a user's session: opens the page, names the part, moves the grasp by half a pixel and back, adds a picture,
+    /// teaches model S and tests it.
     ///
     /// # Errors
     /// A rejected request; failed teaching.
@@ -77,7 +77,7 @@ impl Page {
         let mut marks = session["images"][0]["marks"].clone();
         ensure!(marks.is_object(), "expected the marks of the photo in {session}");
         let x = marks["grasp"]["start"][0].as_f64().context("expected the marks' grasp")?;
-        // There and back, so that a following session starts from nearly the same grasp.
+        // There and back, so that a following session starts from the same grasp.
         for x in [x + 0.5, x] {
             marks["grasp"]["start"][0] = json!(x);
             self.json("PUT", "/api/images/0/marks", marks.to_string().as_bytes())?;

@@ -187,7 +187,7 @@ fn attempt(scenario: Scenario, trouble: Trouble, places: &Places) -> Result<bool
 
 fn check_is_clear(errors: &str, status: Option<ExitStatus>) -> Result<()> {
     let last = errors.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default();
-    // The message is the dynamic loader's, before the program runs.
+    // An error of the dynamic loader, before the program runs.
     let is_loaders =
         last.contains("error while loading shared libraries") || last.contains("cannot open shared object");
     let code = status.and_then(|status| status.code());

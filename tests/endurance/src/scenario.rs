@@ -122,7 +122,8 @@ impl Scenario {
         }
     }
 
-    /// Writes the inputs and, with `has_old`, an output of an earlier call that differs from the new one.
+    /// Writes the inputs. With `has_old`, Teach, Convert and Calibrate also get an older output, different from the new
+    /// one.
     ///
     /// # Errors
     /// Files that cannot be made.
@@ -238,7 +239,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// Number of kills between repetitions of the command: teaching takes seconds.
+    /// One in this many kills is followed by a second run of the command; teaching takes seconds.
     pub fn again_every(self) -> u64 {
         if self == Self::Teach { 4 } else { 1 }
     }
@@ -246,7 +247,8 @@ impl Scenario {
     /// Does what a user does after the power cut: runs the same command again, which must succeed.
     ///
     /// # Errors
-    /// A command that fails, or whose result differs from `reference`, the folder of a run without a power cut.
+    /// A command that fails; a page without the marks; tables that differ from those in `reference`, the folder of the
+    /// run without a power cut.
     pub fn again(self, places: &Places, folder: &Path, reference: &Path) -> Result<()> {
         if self == Self::Annotate {
             let mut server = places.sdg(folder, self.arguments()).spawn()?;

@@ -26,7 +26,7 @@ use crate::scenario::Places;
 
 /// Longer than any frame takes on a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Maximum relative growth of the memory: the allocator keeps some for itself.
+/// Maximum ratio of the memory in the last tenth to that in the fifth: the allocator keeps some for itself.
 const MAX_GROWTH: f64 = 1.05;
 /// Maximum growth in KiB if the memory is small: about one block of the allocator.
 const MAX_GROWTH_KIB: u64 = 4 << 10;
@@ -69,7 +69,7 @@ impl Held {
 #[derive(Debug, Default)]
 struct Course(Vec<Held>);
 
-/// The largest values in a tenth of the run.
+/// The largest values in a tenth of the run, and its processor time.
 #[derive(Debug, Clone, Copy)]
 struct Tenth {
     most: Held,
@@ -93,8 +93,8 @@ impl Course {
         }
     }
 
-    /// Prints the fifth tenth and the last; the first four tenths are the start-up. Processor time is compared only if
-    /// every unit does the same work.
+    /// Prints and compares the fifth tenth and the last; the first four are the start-up. Processor time is compared
+    /// only if every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
         let [early, late] = [4, 9].map(|idx| self.tenth(idx));
@@ -185,7 +185,7 @@ pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
     let address = format!("http://{}/video.mjpg", listener.local_addr()?);
     let (printed, lines) = channel();
     let (planned, each) = (run.frames, run.frames_a_connection);
-    // The thread ends with this process if nobody connects any more.
+    // The thread ends with this process if no client connects any more.
     thread::spawn(move || serve(&listener, &frames, each, &lines));
     let mut arguments = vec!["detect", "--grasp-model", &model, "--from", &address, "--json", "--stall-secs", "60"];
     if run.every_frame {

@@ -1,7 +1,7 @@
 //! Runs a program under ptrace, follows its changes in a folder, and kills it at a given change.
 //!
-//! A seccomp filter stops the program only at the system calls that change files. It also catches calls that a library
-//! makes without the C library, so no library has to be preloaded.
+//! A seccomp filter stops the program only at the system calls that can change or sync files. It also catches calls
+//! that a library makes without the C library, so no library has to be preloaded.
 
 use std::fs;
 use std::io;
@@ -53,7 +53,7 @@ const NAMES: [(c_long, PathArguments); 16] = [
 /// How the program ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// Killed at the requested change.
+    /// Killed before the requested change.
     Killed,
     /// Ended by itself, with this exit code.
     Exited(i32),
@@ -61,7 +61,7 @@ pub enum Ending {
     Signalled(i32),
 }
 
-/// A program that is stopped at its start. Only the thread that started it can trace it.
+/// A started program. Only the thread that started it can trace it.
 #[derive(Debug)]
 pub struct Tracee {
     /// The process; its pipes may be taken.
@@ -69,7 +69,7 @@ pub struct Tracee {
 }
 
 impl Tracee {
-    /// Starts a program; it stays stopped until [`Tracee::follow`].
+    /// Starts a program; it runs to its first call in the filter and waits there for [`Tracee::follow`].
     ///
     /// # Errors
     /// A program that cannot be started or traced.

@@ -7,7 +7,7 @@
 The three small ones were made with torch 2.7.1, torchvision 0.22.1, Pillow 11.1.0 and numpy 2.2.6; the whole one is
 made with the installed versions. The weights have torchvision's names. Losses have this project's names, detections
 are in pixels of the image, targets in pixels of the resized image.
-Every anchor and proposal takes part in the losses: nothing is random.
+The samplers keep all positive and negative anchors and proposals: nothing is random.
 """
 
 import argparse
@@ -48,7 +48,7 @@ GRADIENTS = [
 
 
 class NarrowResNet(ResNet):
-    """ResNet with a sixteenth of its channels."""
+    """ResNet with a sixteenth of its channels, in the stem a quarter."""
 
     def _make_layer(self, block, planes, blocks, stride=1, dilate=False):
         if planes == 64:

@@ -13,7 +13,7 @@ use super::object::{Arena, Object, Pickle, Text, Value};
 /// Maximum number of operations; a ResNet-50 detector with its optimiser's state has about 30 000. Limits memory and
 /// time: an operation adds at most about 200 bytes, besides copies from the file.
 const MAX_OPERATIONS: u32 = 400_000;
-/// Longer texts are not names.
+/// Maximum length of a name, in bytes.
 const LONGEST_NAME: u64 = 1024;
 /// Maximum number of arguments of an allowed function.
 const MAX_ARGUMENTS: usize = 16;
@@ -141,7 +141,7 @@ impl Machine<'_> {
         Ok(top)
     }
 
-    /// Everything above the last mark, and the mark.
+    /// Removes the last mark and everything above it, which is returned.
     fn pop_mark(&mut self) -> Result<Vec<Value>> {
         match self.marks.pop() {
             Some(mark) => Ok(self.stack.split_off(mark)),
