@@ -143,7 +143,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
 #[test]
 fn a_load_that_is_not_told_of_is_felt_and_one_that_is_told_of_is_carried() {
     let (_server, mut robot) = serve_panda();
-    // With a load of 0.5 kg that does not exist, the robot pushes up with 4.9 N, and measures no force against it.
+    // The load of 0.5 kg does not exist: its missing weight is measured as an external force of 4.9 N upwards.
     robot.set_load(&Load { mass: 0.5, center: [0.0, 0.0, 0.1], inertia: [0.0; 9] }).unwrap();
     assert_eq!(robot.read_state().unwrap().load_mass, 0.5);
     let start = robot.state().q_desired;

@@ -23,7 +23,7 @@ const JAW_TIP: f64 = 0.0520;
 const GAP: f64 = 0.00025;
 const HANDLE_MIDDLE: f64 = 0.0054;
 const HANDLE: [(f64, f64); 4] = [(-0.0240, 0.0108), (-0.0500, 0.0205), (-0.0800, 0.0225), (-0.1085, 0.0160)];
-/// Area covered by the steel's texture.
+/// Side of the square that the steel's texture covers.
 const SPAN: f64 = 0.10;
 
 /// The part.

@@ -9,7 +9,8 @@ use crate::objects::GraspError;
 /// The record of an attempt.
 #[derive(Debug, Clone)]
 pub struct AttemptReport {
-    /// The outcome: held if, after lifting and waiting, the part was high enough and between both fingers.
+    /// The outcome: held if, after lifting and waiting, the part was high enough and between both fingers; if it was to
+    /// be put down, it must also be at its place.
     pub outcome: GraspOutcome,
     /// The seed of the start configuration.
     pub seed: u64,

@@ -81,7 +81,7 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
 
 /// Smallest and largest tilt from straight down, in degrees.
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
-/// Largest distance between the part and the point at which the camera is aimed, in metres.
+/// Largest distance in x and in y between the part and the point at which the camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
 /// Maximum number of poses that are tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;

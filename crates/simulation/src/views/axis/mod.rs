@@ -173,7 +173,7 @@ mod tests {
             let apart = (middle(&projected) - middle(&shown)).norm();
             assert!(apart < MIDDLE_TOLERANCE_PX, "{name} {axis} {number}: {apart} px");
             let line = truth.grasp.line;
-            // The marks are at their true position, within the part's outline.
+            // The marks are near the centre of the rendered part.
             assert!((line.center().coords - middle(&shown)).norm() < 60.0, "{name} {axis}: {:?}", line.center());
             let range = if axis == Axis::Tilt { 5.0..20.0 } else { 0.75..1.3 };
             assert!(range.contains(&drawn.parameter.value), "{}", drawn.parameter.description);
