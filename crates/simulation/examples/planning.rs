@@ -2,10 +2,10 @@
 //! [COUNT] [FIRST_SEED]`, `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
 //!
 //! - `rate`: configurations that the collision model checks per second on one core.
-//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps
-//!   of 1 ms: collisions; velocity, acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as
-//!   fractions of the limits; the tcp's speed, acceleration and jerk; the additional time with a stop at every
-//!   waypoint, and the time saved without a jerk limit.
+//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and checks the motion for collisions in
+//!   MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity, acceleration, jerk,
+//!   torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also compares the durations
+//!   with those with a stop at every waypoint, and with those without a jerk limit.
 //!
 //! - `checks`: configurations that the search checks before it reaches one given configuration of the goal, before
 //!   shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).

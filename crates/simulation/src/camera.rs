@@ -68,7 +68,7 @@ mod tests {
     use crate::model::{Geom, Model};
     use crate::render::RenderConfig;
 
-    /// Three balls that distinguish right from left and up from down, seen from the side by a tilted camera.
+    /// Three balls that distinguish right from left and up from down, under a slightly tilted camera.
     fn scene() -> (Data, Renderer) {
         let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, 480).to_degrees();
         let xml = format!(

@@ -15,7 +15,7 @@ use sdg_simulation::{
     WorkcellConfig, marked_grasp,
 };
 
-/// Perception by a function; it stores the pictures.
+/// Perception by a given function; also stores the pictures taken.
 struct Looking<F> {
     find: F,
     views: Vec<CameraView>,

@@ -119,7 +119,7 @@ fn every_generator_moves_the_arm_with_either_controller() {
 fn torques_move_the_arm_and_gravity_is_the_robots() {
     let (_server, mut robot) = serve_panda();
     let start = robot.read_state().unwrap().clone();
-    // Without commands the arm floats in place.
+    // With commands of zero the arm floats in place.
     let mut clock = Clock::default();
     let floating = robot.control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0)).unwrap();
     let drift = (0..7).map(|joint| (floating.q[joint] - start.q[joint]).abs()).fold(0.0, f64::max);
