@@ -26,7 +26,7 @@ pub struct AttemptReport {
     pub place_error: Option<GraspError>,
     /// Amplitude of the hand's swing after lifting, in metres; `None` if the hand was not shaken.
     pub shake_amplitude_m: Option<f64>,
-    /// The verdict of the hand's width and force after each of the last steps; see [`sdg_robot::GraspReport`].
+    /// The verdict of the hand's width and force after closing, lifting and holding; see [`sdg_robot::GraspReport`].
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// Height of the part's lowest point above the table at the end, in metres.
     pub object_height_m: Option<f64>,
