@@ -188,7 +188,7 @@ fn sleeve_half_size(part: f64) -> (f64, f64) {
     ((0.0044 + guard + belly) * fade, (0.0052 + 0.2 * belly) * fade)
 }
 
-/// Half width and half height of the inlay on a sleeve, which it exceeds on top.
+/// Half width and half height of the inlay on a sleeve; the inlay is higher than the sleeve.
 fn inlay_half_size(part: f64) -> (f64, f64) {
     let fade = (1.0 - (2.0 * part - 1.0).abs().powi(4)).max(0.02).sqrt();
     (0.0031 * fade, 0.0050 + 0.0008 * fade)
