@@ -161,8 +161,7 @@ struct Errors {
     wider_m: f64,
     picture_age_secs: f64,
     table_m: f64,
-    /// Probability for each state, and for each command, that losses begin with it; then [`Self::lost_in_a_row`] are
-    /// lost.
+    /// Probability that losses begin with a state, or with a command; [`Self::lost_in_a_row`] of them are then lost.
     lost: f64,
     lost_in_a_row: u64,
 }

@@ -7,8 +7,8 @@
 //!   torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also compares the durations
 //!   with those with a stop at every waypoint, and with those without a jerk limit.
 //!
-//! - `checks`: configurations that the search checks before it reaches one given configuration of the goal, before
-//!   shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
+//! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
+//!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
 //! - `length`: the duration of a plan compared with the best found in SECONDS (60) of optimisation: the same planner
 //!   repeated with other seeds, and with fifty times the attempts to shorten. COUNT (50) problems whose goal no
 //!   straight motion reaches.

@@ -17,7 +17,7 @@ use crate::render::Renderer;
 /// Focal length of the wrist camera in pixels, as in the paper.
 pub const WRIST_FOCAL_LENGTH_PX: f64 = 550.0;
 
-/// A picture and its camera with its pose in the world (the robot's base frame).
+/// A picture and the camera that took it, posed in the world (the robot's base frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraView {
     /// The picture.

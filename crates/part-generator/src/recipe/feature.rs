@@ -94,7 +94,7 @@ pub(crate) enum RippleKind {
     Hexagon,
 }
 
-/// The operation within the feature's shape.
+/// The operation of a feature.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Operation {
     /// Material from `bottom` to `top`.
@@ -153,7 +153,7 @@ pub(crate) enum Operation {
         /// Width of the slope.
         width: f32,
     },
-    /// Changes the material but not the height: print, label, paint, a ground face.
+    /// Changes the material but not the height: print, label, mark.
     Paint,
 }
 

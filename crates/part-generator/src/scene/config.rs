@@ -68,7 +68,7 @@ impl Condition {
     }
 }
 
-/// Properties of scenes: probabilities and ranges, sampled independently for every picture.
+/// Properties of scenes. Probabilities and ranges are sampled independently for every picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
     /// Width of the picture, in pixels.
