@@ -18,8 +18,8 @@ pub(crate) struct Tile {
     values: Box<[f32; SIDE * SIDE]>,
 }
 
-/// The largest integer that is at most `value`; for some integer values the integer below. `value` must be within four
-/// million of 0. It has no call and no comparison, so compilers vectorise it.
+/// The largest integer that is at most `value`; for some integer values the integer below. The magnitude of `value`
+/// must be below four million. The function has no call and no comparison, so compilers vectorise it.
 #[inline(always)]
 pub(crate) fn floor(value: f32) -> i32 {
     // 1.5 * 2^23: the low bits of a sum with it are the integer.

@@ -119,7 +119,7 @@ impl PandaIds {
         ArmVector::from_fn(|joint, _| data.qvel()[self.qvel[joint]])
     }
 
-    /// Sets the arm to a configuration at rest; not for use between the steps of a simulation.
+    /// Sets the arm to a configuration at rest, without dynamics.
     pub fn set_position(&self, data: &mut Data, q: &ArmVector) {
         for joint in 0..NUM_ARM_JOINTS {
             data.qpos_mut()[self.qpos[joint]] = q[joint];
@@ -142,7 +142,7 @@ impl PandaIds {
         self.finger_qvel.map(|index| data.qvel()[index])
     }
 
-    /// Sets the fingers to a position at rest; not for use between the steps of a simulation.
+    /// Sets the fingers to a position at rest, without dynamics.
     pub fn set_finger_position_m(&self, data: &mut Data, position_m: f64) {
         for finger in 0..2 {
             data.qpos_mut()[self.finger_qpos[finger]] = position_m;

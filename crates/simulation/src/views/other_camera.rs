@@ -217,7 +217,7 @@ mod tests {
             assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
             let empty = SceneVariation { object: None, ..scene_of(&spec, camera) };
             let without = draw(empty, &first.view.camera).unwrap();
-            // The centre of the pixels that the part changed is closer to its marks than the part's size.
+            // The centre of the pixels that differ is less than the part's size from the marks.
             let changed: Vec<Vector3<f64>> = first
                 .view
                 .image
