@@ -4,14 +4,14 @@
 //! - `rate`: configurations that the collision model checks per second on one core.
 //! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and checks the motion for collisions in
 //!   MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity, acceleration, jerk,
-//!   torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also compares the durations
-//!   with those with a stop at every waypoint, and with those without a jerk limit.
+//!   torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also gives the ratios of
+//!   the durations to those with a stop at every waypoint and to those without a jerk limit.
 //!
 //! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
 //!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
 //! - `length`: the duration of a plan compared with the best found in SECONDS (60) of optimisation: the same planner
-//!   repeated with other seeds, and with fifty times the attempts to shorten. COUNT (50) problems whose goal no
-//!   straight motion reaches.
+//!   repeated with other seeds, and with fifty times the attempts to shorten. It uses COUNT (50) problems whose
+//!   goal no straight motion reaches.
 //!
 //! `rate` and `proof` are timed by the clock and by the thread's processor time from Linux, which does not depend on
 //! other programs on the machine.
