@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn the_installed_library_is_the_one_described() {
         assert_eq!(load(), Ok(()));
-        // Every constructor of the simulation calls it again.
+        // A further call returns the same result.
         assert_eq!(load(), Ok(()));
     }
 

@@ -14,8 +14,7 @@
 //! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in
 //! library.rs; the other functions declared by the bindings are not linked.
 //!
-//! Not included: safe wrappers (crate `sdg-simulation`), MuJoCo's small vector library, its
-//! user interface and its printing functions.
+//! Not included: safe wrappers (crate `sdg-simulation`), MuJoCo's small vector library and its user interface.
 //!
 //! ```
 //! sdg_mujoco_sys::load().expect("libmujoco is 2.2.2");

@@ -32,7 +32,7 @@ pub(crate) fn load(check: impl FnOnce(&Functions) -> Result<(), LibraryError>) -
     loaded.as_ref().map(|_| ()).map_err(Clone::clone)
 }
 
-/// The handlers of errors and of warnings. The error handler may unwind through MuJoCo.
+/// Sets the handlers of errors and of warnings. The error handler may unwind through MuJoCo.
 ///
 /// # Safety
 /// No other thread is inside a function of MuJoCo.

@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     Some((kind, seed)) => part.look_alike(kind, seed),
                 };
                 if let Some(other) = other {
-                    // An equal fill for all would hide the size, so each part is drawn in proportion.
+                    // With equal `fill`, all would look equally large, so each part is drawn in proportion.
                     let fill = 0.6 * other.diagonal_mm() / part.diagonal_mm();
                     let config = PhotoConfig { fill: [fill, fill], ..photo };
                     let taken = DemonstrationPhoto::take(&other, &config, seed);

@@ -113,7 +113,7 @@ fn measure(image: &RgbImage, boxes: &[BoundingBox]) -> Measured {
     Measured { values, parts }
 }
 
-/// Distance between the mean colours of a box and of a surrounding frame with a fifth of its size.
+/// Distance between the mean colours of a box and of a frame around it, whose width is a fifth of the box's size.
 fn contrast(image: &RgbImage, bbox: &BoundingBox) -> f64 {
     let mut sums = [[0.0f64; 4]; 2];
     let (mx, my) = (0.2 * bbox.width(), 0.2 * bbox.height());

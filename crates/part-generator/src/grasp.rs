@@ -111,7 +111,7 @@ fn along(
             }
             (a, b) = (0.0, 0.0);
         }
-        // Both marks are on the part, not beyond its ends.
+        // The marks do not extend beyond the part's ends, unless they would be too close together.
         let room = (high - a).min(a - low);
         let half = (0.3 * (high - low)).min(0.28 * diagonal).min(room).max((0.06 * diagonal).max(1.5));
         let place = |along: f32| [center[0] + cos * along - sin * b, center[1] + sin * along + cos * b];

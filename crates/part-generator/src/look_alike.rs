@@ -98,8 +98,8 @@ impl<R: Draw> DrawGroup for R {
     }
 }
 
-/// The recipe with one group moved by `shift` in a direction. If the group is the body, a corner, bend or shoulder is
-/// moved.
+/// The recipe with one group moved by `shift` in a direction. If the group is the body, a corner, bend or end of it is
+/// moved, or a rectangle is lengthened.
 fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Recipe> {
     let mut made = recipe.clone();
     let (sin, cos) = direction.sin_cos();

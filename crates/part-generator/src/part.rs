@@ -130,7 +130,7 @@ fn outline(relief: &Relief) -> Option<Polygon> {
     Polygon::new(vertices).ok()
 }
 
-/// Whether the part is connected, except for specks.
+/// Whether the part is connected, except for specks, and covers enough cells.
 fn is_one_piece(relief: &Relief) -> bool {
     let level = &relief.levels[1];
     let mut left: Vec<bool> = level.texels.iter().map(|texel| texel.top > 0).collect();

@@ -18,7 +18,7 @@ pub(crate) const BLOCK_CELLS: usize = 8;
 /// Number of height steps per millimetre.
 const STEPS_PER_MM: f32 = 200.0;
 
-/// Maximum slope of a normal.
+/// Maximum slope of the surface in a normal.
 const MAX_SLOPE: f32 = 3.0;
 
 /// Height difference between neighbours, in cells, above which a step is a wall, which normals ignore.

@@ -12,14 +12,14 @@ const SIDE: usize = 256;
 /// Number of normally distributed numbers in the table.
 const NORMALS: usize = 1 << 15;
 
-/// Values around 0, mostly in [-1, 1], with a seamless period of 256 texels.
+/// Values mostly in [-1, 1], with a seamless period of 256 texels.
 pub(crate) struct Tile {
     /// An array, whose length the compiler knows: a masked index needs no bounds check.
     values: Box<[f32; SIDE * SIDE]>,
 }
 
-/// The largest integer that is at most `value`; for some integer values the integer below. `value` must be within four
-/// million of 0. It has no call and no comparison, so compilers vectorise it.
+/// The largest integer that is at most `value`; for some integer values the integer below. The magnitude of `value`
+/// must be below four million. The function has no call and no comparison, so compilers vectorise it.
 #[inline(always)]
 pub(crate) fn floor(value: f32) -> i32 {
     // 1.5 * 2^23: the low bits of a sum with it are the integer.
@@ -31,7 +31,7 @@ pub(crate) fn floor(value: f32) -> i32 {
 pub(crate) struct Tiles {
     /// Smooth clouds of several sizes.
     pub cloud: Tile,
-    /// A new value for every texel, slightly smoothed.
+    /// Fine grain: values that change within two texels.
     pub grain: Tile,
     /// Streaks along x.
     pub streak: Tile,

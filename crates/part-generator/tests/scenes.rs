@@ -43,8 +43,8 @@ fn the_truth_lies_on_the_part() {
             let moved = instance.image_from_demonstration.apply(&taught.grasp.unwrap().center());
             assert!((moved - instance.grasp.center()).norm() < 1e-6);
             assert!((instance.scale * scenes.sample(index).conditions.distance - 1.0).abs() < 0.25);
-            // Without tilt, the demonstration's outline transformed with the part is the outline found, except for the
-            // perspective of heights: from another position, some pixels of the walls of tall parts are visible.
+            // Without tilt, the demonstration's outline, transformed with the part, equals the instance's outline,
+            // except for visible walls of tall parts.
             if condition == Condition::Nominal {
                 let outline = taught.outline.as_ref().unwrap().transformed(&instance.image_from_demonstration);
                 let found = instance.outline().unwrap();

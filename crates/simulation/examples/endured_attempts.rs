@@ -37,8 +37,7 @@ const UNTOUCHED_NM: f64 = 1.0;
 /// Tolerance of velocities, accelerations, jerks, torques and contact times, as a fraction of the limit: a joint
 /// controlled by torques does not follow its reference exactly.
 const TOLERANCE: f64 = 0.05;
-/// Tolerance of joint positions and of the workspace, as a fraction of half of the range: some milliradians or
-/// millimetres.
+/// Tolerance of joint positions and of the workspace, as a fraction of half of the range: at most 29 mrad or 5.5 mm.
 const RANGE_TOLERANCE: f64 = 0.01;
 /// External torques at which a Franka stops in motions that may touch the table, N·m.
 const CONTACT_TORQUE_NM: [f64; 7] = [40.0, 40.0, 36.0, 36.0, 32.0, 28.0, 24.0];
@@ -162,8 +161,7 @@ struct Errors {
     wider_m: f64,
     picture_age_secs: f64,
     table_m: f64,
-    /// Probability for each state, and for each command, that losses begin with it; then [`Self::lost_in_a_row`] are
-    /// lost.
+    /// Probability that losses begin with a state, or with a command; [`Self::lost_in_a_row`] of them are then lost.
     lost: f64,
     lost_in_a_row: u64,
 }

@@ -23,7 +23,7 @@ mod placing;
 
 use placing::{Where, beside, cell, config, grasp_on_other_table, place, tray, tray_of};
 
-/// How much higher the table is than the robot was told, in metres.
+/// Height of the table above the height given to the robot, in metres.
 const HIGHER_M: f64 = 0.005;
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
@@ -31,7 +31,7 @@ const MAX_MOVED_M: f64 = 0.5e-3;
 const MAX_OVER_REST_M: f64 = 0.005;
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
-/// The paper's parts that the hand still holds if it grasps 5 mm too high.
+/// The parts that are grasped if none are given.
 const PARTS: [&str; 4] = ["pendulum", "fuel_line", "rod_end", "common_line"];
 
 fn main() -> Result<(), Box<dyn Error>> {

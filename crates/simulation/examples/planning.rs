@@ -2,15 +2,15 @@
 //! [COUNT] [FIRST_SEED]`, `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
 //!
 //! - `rate`: configurations that the collision model checks per second on one core.
-//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps
-//!   of 1 ms: collisions; velocity, acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as
-//!   fractions of the limits; the tcp's speed and acceleration; the additional time with a stop at every waypoint, and
-//!   the time saved without a jerk limit.
+//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and checks the motion for collisions in
+//!   MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity, acceleration, jerk,
+//!   torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also gives the ratios of
+//!   the durations to those with a stop at every waypoint and to those without a jerk limit.
 //!
-//! - `checks`: configurations that the search checks before it reaches one given configuration of the goal, before
-//!   shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
+//! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
+//!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
 //! - `length`: the duration of a plan compared with the best found in SECONDS (60) of optimisation: the same planner
-//!   repeated with other seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose
+//!   repeated with other seeds, and with fifty times the attempts to shorten. It uses COUNT (50) problems whose
 //!   goal no straight motion reaches.
 //!
 //! `rate` and `proof` are timed by the clock and by the thread's processor time from Linux, which does not depend on

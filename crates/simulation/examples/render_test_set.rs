@@ -4,7 +4,7 @@
 //! `cargo run --release -p sdg-simulation --example render_test_set OBJECT COUNT SEED FOLDER`
 //!
 //! Writes `with_000.png …`, `without_000.png …` and `truth.json` into FOLDER. For each image, `truth.json` has its
-//! file, and for images with the part the grasp in pixels and in the base frame.
+//! file, table and distractors, and for images with the part the grasp in pixels and in the base frame.
 
 use std::fs;
 use std::path::PathBuf;

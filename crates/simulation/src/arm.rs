@@ -16,7 +16,7 @@ type Result<T> = sdg_robot::Result<T>;
 
 /// Distance of a joint from its reference above which the arm counts as blocked, in radians.
 const BLOCKED_RAD: f64 = 0.03;
-/// Interval of checks of a closing hand, in seconds.
+/// Interval of checks of a moving hand, in seconds.
 const HAND_PERIOD_SECS: f64 = 0.05;
 /// Time without movement after which the fingers count as closed, in seconds.
 const HAND_STILL_SECS: f64 = 0.2;

@@ -122,7 +122,7 @@ mod tests {
             let friction = AttemptErrors::friction(seed).pad_friction.unwrap();
             assert!((0.6..0.8).contains(&friction), "{friction}");
         }
-        // The mean of 200 random directions has a length of about 2 mm / sqrt(200).
+        // The mean of 200 random shifts of 2 mm has a length of about 2 mm / sqrt(200).
         assert!((sum / 200.0).norm() < 3.0 * 0.002 / 200f64.sqrt(), "{sum}");
         assert_eq!(AttemptErrors::shake(3), AttemptErrors::shake(3));
         assert_ne!(AttemptErrors::shake(3), AttemptErrors::shake(4));

@@ -17,7 +17,7 @@ use crate::render::Renderer;
 /// Focal length of the wrist camera in pixels, as in the paper.
 pub const WRIST_FOCAL_LENGTH_PX: f64 = 550.0;
 
-/// A picture and its camera with its pose in the world (the robot's base frame).
+/// A picture and the camera that took it, posed in the world (the robot's base frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraView {
     /// The picture.
@@ -68,7 +68,7 @@ mod tests {
     use crate::model::{Geom, Model};
     use crate::render::RenderConfig;
 
-    /// Three balls that distinguish right from left and up from down, seen from the side by a tilted camera.
+    /// Three balls that distinguish right from left and up from down, under a slightly tilted camera.
     fn scene() -> (Data, Renderer) {
         let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, 480).to_degrees();
         let xml = format!(

@@ -15,7 +15,7 @@ use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
 /// Two overlapping bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlap {
-    /// Bodies of the arm, or an obstacle's name.
+    /// Names of bodies of the arm, or of an obstacle.
     pub between: [String; 2],
     /// Depth, m.
     pub depth_m: f64,

@@ -61,7 +61,7 @@ impl Workcell {
         std::mem::take(&mut self.peak_felt_n)
     }
 
-    /// Advances one period under torques in addition to those that hold the arm and its load; friction is subtracted.
+    /// Advances one period: the motors get `torque`, plus the torques that hold the arm and its load, minus friction.
     fn torque_tick(&mut self, torque: &JointVector) -> Result<()> {
         let q = self.panda_ids.position(&self.data);
         let dq = self.panda_ids.velocity(&self.data);

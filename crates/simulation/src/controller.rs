@@ -38,7 +38,7 @@ pub struct ArmController {
 }
 
 impl Default for ArmController {
-    /// 5 Hz, critically damped, Franka's torques.
+    /// About 5 Hz, critically damped, Franka's torques.
     fn default() -> Self {
         Self {
             frequency_rad_s: 30.0,

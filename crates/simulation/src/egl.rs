@@ -64,7 +64,7 @@ unsafe impl Send for Unused {}
 /// rendering a picture.
 static UNUSED: Mutex<Vec<Unused>> = Mutex::new(Vec::new());
 
-/// A separate OpenGL context. It is current on a thread only while a [`Current`] exists.
+/// An OpenGL context. It is current on a thread only while a [`Current`] exists.
 pub(crate) struct OffscreenContext {
     egl: &'static Surfaceless,
     context: egl::Context,

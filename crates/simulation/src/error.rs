@@ -37,7 +37,8 @@ pub enum SimulationError {
         message: String,
     },
 
-    /// The simulation diverged (not a number, or huge, positions, velocities or accelerations).
+    /// The simulation diverged (positions, velocities or accelerations are infinite, NaN or huge), or it has too many
+    /// contacts or constraints.
     #[error("the simulation became unstable at {time_secs:.3} s of simulated time: {message}")]
     Unstable {
         /// Simulated time at which the error was detected, in seconds.
@@ -85,7 +86,7 @@ pub enum SimulationError {
     #[error("perception failed: {0}")]
     Perception(String),
 
-    /// The arm was stopped, stopped itself, or does not move.
+    /// Another error of the arm or its hand, such as a stopped arm.
     #[error("{0}")]
     Robot(String),
 }

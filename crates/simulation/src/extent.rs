@@ -91,7 +91,7 @@ mod tests {
         }
     }
 
-    /// Tests that every visible shape of the arm is inside one capsule of its link, so that links with separate
+    /// Tests that every visible shape of the arm is inside one wide capsule of its link, so that links with separate
     /// capsules are separate.
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
@@ -145,8 +145,8 @@ mod tests {
         assert!(num_held > 100, "{num_held} shapes were examined");
     }
 
-    /// Tests the fit of the planner's capsules: they contain all visible shapes of a link, and extend beyond the link's
-    /// visible and collision shapes by at most a given distance.
+    /// Tests the fit of the planner's capsules: they contain the visible shapes of a link (except the foot's
+    /// underside), and extend beyond the link's visible and collision shapes by at most a given distance.
     #[test]
     fn the_capsules_of_the_planner_fit_the_simulated_arm() {
         use crate::panda::{PandaIds, panda_asset};

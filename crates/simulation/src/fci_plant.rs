@@ -157,7 +157,7 @@ impl Plant for PandaPlant {
         let joints = *self.ids.qvel_indices();
         let dq = self.ids.velocity(&self.data);
         for joint in 0..NUM_ARM_JOINTS {
-            // A robot's torque sensors are behind the gears, whose friction its own control compensates.
+            // The robot's own control compensates the joints' damping, but not the added dry friction.
             let compensated = self.data.qfrc_passive()[joints[joint]];
             let friction = friction_torque_nm(self.friction_nm, dq[joint]);
             self.data.ctrl_mut()[self.ids.motors[joint].index()] = torque[joint] - compensated - friction;

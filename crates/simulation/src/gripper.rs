@@ -42,7 +42,7 @@ impl Gripper {
 
     /// Starts to close until each finger presses with `force_n` newtons.
     pub fn grasp(&mut self, force_n: f64) {
-        // The reference may move into the part as far as the spring needs for the force.
+        // The reference may move into the part as far as the spring needs for the largest force.
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
         *self =
             Self { target_m: -beyond, speed_m_s: 0.05, max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N), ..*self };

@@ -119,7 +119,7 @@ impl PandaIds {
         ArmVector::from_fn(|joint, _| data.qvel()[self.qvel[joint]])
     }
 
-    /// Sets the arm to a configuration at rest; only right before a simulation starts.
+    /// Sets the arm to a configuration at rest, without dynamics.
     pub fn set_position(&self, data: &mut Data, q: &ArmVector) {
         for joint in 0..NUM_ARM_JOINTS {
             data.qpos_mut()[self.qpos[joint]] = q[joint];
@@ -142,7 +142,7 @@ impl PandaIds {
         self.finger_qvel.map(|index| data.qvel()[index])
     }
 
-    /// Sets the fingers to a position at rest; only right before a simulation starts.
+    /// Sets the fingers to a position at rest, without dynamics.
     pub fn set_finger_position_m(&self, data: &mut Data, position_m: f64) {
         for finger in 0..2 {
             data.qpos_mut()[self.finger_qpos[finger]] = position_m;
@@ -180,8 +180,7 @@ mod tests {
         (Data::new(model).unwrap(), ids)
     }
 
-    /// Tests that the hand's opening is the same in `fci`, which depends on no other crate, in `kinematics`, and in the
-    /// MJCF.
+    /// Tests that the hand's opening is the same in `sdg-fci`, in `sdg-kinematics`, and in the MJCF.
     #[test]
     fn the_hand_opens_as_far_everywhere() {
         assert_eq!(sdg_fci::server::HAND_MAX_WIDTH_M, kinematics::HAND_OPENING_MAX_M);

@@ -34,8 +34,8 @@ impl PlanningProblem {
     /// Minimum distance of start and goal from the joints' limits, rad.
     const INSIDE_RAD: f64 = 0.05;
 
-    /// The problem of a seed; the same seed gives the same problem. Start and goal are sampled from the joints' full
-    /// ranges.
+    /// The problem of a seed; the same seed gives the same problem. Start and goal are sampled from nearly the
+    /// joints' full ranges.
     pub fn random(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());

@@ -31,7 +31,7 @@ pub struct RenderConfig {
     pub samples: u32,
     /// Side of the shadow map in texels; 0 for no shadows.
     pub shadow_size: u32,
-    /// Whether reflective surfaces show the scene, which is then rendered twice.
+    /// Whether reflective surfaces show the scene; it is then rendered twice.
     pub reflections: bool,
     /// Geom groups to render. By MuJoCo's convention, which the workcell follows, visible shapes are in groups 0 to 2
     /// and collision shapes in group 3.

@@ -10,8 +10,8 @@ use crate::model::{Geom, Id, Kind, Model};
 const CHAIN: [&str; 9] = ["link0", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand"];
 /// MuJoCo's group of collision shapes.
 const COLLISION_GROUP: i32 = 3;
-/// Minimum number of joints between two bodies that are compared: with fewer, both are at the elbow or the wrist, where
-/// their capsules overlap in every posture.
+/// Minimum difference of the places in the chain of two bodies that are compared: the capsules of closer bodies may
+/// overlap in every posture, as at the elbow and the wrist.
 const MIN_JOINTS_APART: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
@@ -39,8 +39,8 @@ impl LinkCapsules {
         Self(capsules.collect())
     }
 
-    /// The smallest distance between the capsules of two bodies that are at least [`MIN_JOINTS_APART`] joints apart, in
-    /// metres; negative if they overlap.
+    /// The smallest distance between the capsules of two bodies that are at least [`MIN_JOINTS_APART`] places apart in
+    /// the chain, in metres; negative if they overlap.
     pub(crate) fn distance_m(&self, data: &Data) -> f64 {
         let placed: Vec<Capsule> = self
             .0

@@ -15,7 +15,7 @@ use sdg_simulation::{
     WorkcellConfig, marked_grasp,
 };
 
-/// Perception by a function, which also stores the pictures.
+/// Perception by a given function; also stores the pictures taken.
 struct Looking<F> {
     find: F,
     views: Vec<CameraView>,
@@ -71,7 +71,7 @@ fn bar_cell(x: f64, y: f64, yaw_rad: f64) -> Workcell {
     unlit_cell(SceneVariation::nominal(Some((&spec, pose))))
 }
 
-/// A workcell with fast rendering, because these tests do not use its pictures.
+/// A workcell with fast rendering: no shadows and no antialiasing.
 fn unlit_cell(scene: SceneVariation) -> Workcell {
     let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
     Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }).unwrap()
@@ -159,7 +159,7 @@ fn who_does_not_find_the_part_looks_from_elsewhere() {
     let mut looks = 0;
     let mut blind_twice = Looking::new(|| {
         looks += 1;
-        // The first picture, and the first one from above, do not show the part.
+        // The part is not found in the first picture, and not in the first one from above.
         (looks != 1 && looks != 3).then(true_target)
     });
     let report = cell.run_attempt(&mut blind_twice, &AttemptConfig::default(), 1).unwrap();
@@ -306,7 +306,7 @@ fn worn_pads_and_a_shake_ask_for_more_force() {
     let worn = AttemptErrors { pad_friction: Some(0.6), ..AttemptErrors::default() };
     let held = run(AttemptErrors { shake: AttemptErrors::shake(1).shake, ..worn }, 0.2, 40.0);
     assert_eq!(held.outcome, GraspOutcome::Held);
-    // The arm's limits allow most of the requested 20 to 30 mm.
+    // The arm's limits may reduce the requested 20 to 30 mm.
     let amplitude_m = held.shake_amplitude_m.unwrap();
     assert!((0.010..=0.030).contains(&amplitude_m), "{amplitude_m}");
     // A bar of 1.2 kg weighs 11.8 N. Two new pads pressed with 8 N hold 16 N; worn ones hold 2 * 0.6 * 8 N = 9.6 N.

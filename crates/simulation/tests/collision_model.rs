@@ -10,7 +10,7 @@ use sdg_simulation::{CollisionWorld, random_obstacles};
 
 /// Largest depth of an overlap in MuJoCo that the model misses, m.
 const MAX_MISSED_M: f64 = 0.003;
-/// Largest fraction of the configurations that are free in MuJoCo but not in the model.
+/// Largest fraction of the configurations free in MuJoCo that collide in the model.
 const MAX_FALSE_COLLISIONS: f64 = 0.05;
 
 fn random_configurations(count: usize, rng: &mut Pcg64Mcg) -> Vec<JointVector> {

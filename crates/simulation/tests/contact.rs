@@ -1,5 +1,4 @@
-//! Compliant descents over the network, in lockstep: onto a table that is higher than the given height, with friction
-//! in every joint.
+//! Compliant descents over the network, in lockstep, onto a table that is higher than the given height.
 
 use crate::network::connect;
 use sdg_fci::server::{Pace, Server, ServerConfig};
@@ -14,7 +13,7 @@ use sdg_simulation::{FINGERTIP_BEYOND_TCP_M, PandaPlant, Workcell, WorkcellConfi
 const FRICTION_NM: f64 = 1.0;
 /// Height of the table above the table height in the limits.
 const HIGHER_M: f64 = 0.005;
-/// Start of the tcp's descent: about 20 mm above the table.
+/// Start of the tcp's descent, m: the finger tips are 20 mm above the table.
 const ABOVE_M: [f64; 3] = [0.45, 0.0, 0.024];
 /// Largest static force that does not damage part or table.
 const MAX_STATIC_N: f64 = 10.0;
@@ -83,7 +82,7 @@ fn joint_positions_press_on_the_same_table_until_the_robot_stops() {
     let mut robot = Robot::new(&mut arm, limits(), Watch::default());
     go_above(&mut robot);
     robot.set_contact_sensitivity(ContactSensitivity::Contact).unwrap();
-    // The motion ends at the contact with a table at the given height.
+    // The motion ends 1.5 mm above the contact with a table at the given height.
     let motion = line_to(&mut robot, [ABOVE_M[0], ABOVE_M[1], FINGERTIP_BEYOND_TCP_M - HIGHER_M + 0.0015]);
     let error = robot.follow(motion).unwrap_err();
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");

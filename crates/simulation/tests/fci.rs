@@ -119,7 +119,7 @@ fn every_generator_moves_the_arm_with_either_controller() {
 fn torques_move_the_arm_and_gravity_is_the_robots() {
     let (_server, mut robot) = serve_panda();
     let start = robot.read_state().unwrap().clone();
-    // Without commands the arm floats in place.
+    // With commands of zero the arm floats in place.
     let mut clock = Clock::default();
     let floating = robot.control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0)).unwrap();
     let drift = (0..7).map(|joint| (floating.q[joint] - start.q[joint]).abs()).fold(0.0, f64::max);
@@ -143,7 +143,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
 #[test]
 fn a_load_that_is_not_told_of_is_felt_and_one_that_is_told_of_is_carried() {
     let (_server, mut robot) = serve_panda();
-    // With a load of 0.5 kg that does not exist, the robot pushes up with 4.9 N, and measures no force against it.
+    // The load of 0.5 kg does not exist: its missing weight is measured as an external force of 4.9 N upwards.
     robot.set_load(&Load { mass: 0.5, center: [0.0, 0.0, 0.1], inertia: [0.0; 9] }).unwrap();
     assert_eq!(robot.read_state().unwrap().load_mass, 0.5);
     let start = robot.state().q_desired;

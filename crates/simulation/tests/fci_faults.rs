@@ -17,11 +17,11 @@ use sdg_fci::wire::{
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
-/// Largest time until the arm is at rest. A joint of a Panda brakes from its full speed in at most 0.29 s, joint 1 in
-/// 0.03 s from the test's speed; the rest allows for the controller to settle.
+/// Largest time until joint 1 is at rest: it brakes from the test's speed in 0.03 s; the rest allows for the controller
+/// to settle.
 const STOPPING_TIME: Duration = Duration::from_millis(200);
 
-/// Waits until the arm is at rest, at most [`STOPPING_TIME`] of the robot's clock, and checks that it stays at rest.
+/// Waits until joint 1 is at rest, at most [`STOPPING_TIME`] of the robot's clock, and checks that it stays at rest.
 fn assert_stands(robot: &mut Robot) {
     let stopped = robot.read_state().unwrap().clone();
     let begin = stopped.message_id;

@@ -1,7 +1,7 @@
-//! Faults of the network: the arm stops, one line states the reason, and nothing moves by itself afterwards.
+//! Faults of a grasp over the network. Unless the sequence can continue, the arm stops, one line states the reason, and
+//! nothing moves by itself afterwards.
 //!
-//! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) are in fci_faults.rs, faults
-//! of an arm in this process in robot_faults.rs.
+//! Faults without the grasp sequence are in fci_faults.rs, faults of an arm in this process in robot_faults.rs.
 
 use std::thread;
 use std::time::{Duration, Instant};

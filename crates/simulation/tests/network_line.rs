@@ -16,16 +16,16 @@ use sdg_simulation::{SharedPositions, Workcell};
 
 /// Lockstep in which a command counts as lost if it has not arrived after 20 ms.
 const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(20) };
-/// Number of states after the motion's start at which a fault occurs, while the arm moves.
+/// Number of the state or command of the motion at which a fault begins, while the arm moves.
 const FAULT_AT: u64 = 500;
-/// Maximum time of a test; a client that receives no new state gives up after 3 s.
+/// Maximum duration of a motion with a fault; a client that receives no new state gives up after 3 s.
 const MAX_WAIT: Duration = Duration::from_secs(20);
 
 fn all_pass() -> PassCommand {
     Box::new(|_| true)
 }
 
-/// Changes this many states from [`FAULT_AT`] on.
+/// Changes `num_states` states from [`FAULT_AT`] on.
 fn changing(num_states: u64, mut change: impl FnMut(&mut RobotState) + Send + 'static) -> ChangeState {
     Box::new(move |number, state| {
         let mut state = state.clone();
@@ -160,7 +160,7 @@ fn twenty_lost_states_or_commands_stop_the_arm() {
         assert!(text.starts_with("the arm stopped itself: communication_constraints_violation ("), "{text}");
         assert_eq!(line.arm.state().unwrap().mode, ArmMode::Reflex);
         assert!(states.len() > 400);
-        // The answer overtakes the states of the relay; a motion begins nevertheless.
+        // The robot's answer arrives before the states that the relay delays; a motion begins nevertheless.
         line.robot().recover().unwrap();
         line.arrives();
     }

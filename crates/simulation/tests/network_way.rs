@@ -1,5 +1,5 @@
 //! A planned path around a wall over TCP and UDP, in lockstep: it is followed without stops at its waypoints, and
-//! stopped in a corner.
+//! stopped half-way.
 
 use crate::network::{connect, serve};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -12,7 +12,7 @@ use sdg_robot::{
 use sdg_simulation::scene::SceneVariation;
 use sdg_simulation::{CollisionWorld, Workcell, WorkcellConfig};
 
-/// Largest distance between the arm and its reference during motion, rad: a stiff arm lags by at most 30 ms.
+/// Largest difference between a joint's position and its reference during motion, rad.
 const TRACKING_RAD: f64 = 0.02;
 
 fn wall() -> Obstacle {
@@ -35,7 +35,7 @@ fn cell() -> Workcell {
     cell
 }
 
-/// Plans a path to the other side of the wall, which must be a single motion.
+/// Plans a path to a pose beside the wall; the path must be a single motion.
 fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     let obstacles = [wall()];
     let surroundings = Surroundings {
@@ -53,7 +53,7 @@ fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     way.motions.into_iter().next().unwrap()
 }
 
-/// Deviation of a motion from the straight one, rad.
+/// Largest deviation of a motion from a straight line in joint space, rad.
 fn bend_rad(motion: &Trajectory) -> f64 {
     let (start, way) = (motion.start(), motion.end() - motion.start());
     let off = |share: usize| {
@@ -84,7 +84,7 @@ fn a_way_over_a_wall_is_followed_in_one_motion() {
         let q = JointVector::from_column_slice(&positions.get()[..7]);
         assert!((q - motion.end()).amax() < TRACKING_RAD, "{q}");
     }
-    // One of the two motions may be straight, from the end configuration of the other.
+    // One of the two motions may be straight.
     assert!(most_bent_rad > 0.1, "{most_bent_rad}");
     drop(arm);
     server.stop().unwrap();

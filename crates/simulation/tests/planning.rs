@@ -1,5 +1,5 @@
-//! Plans for random problems, followed in MuJoCo at every millisecond; `make bench-planning` does the same with a
-//! thousand problems.
+//! Plans for random problems, checked for collisions in MuJoCo at every millisecond; `make bench-planning` does the
+//! same with a thousand problems.
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;

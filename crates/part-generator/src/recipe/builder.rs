@@ -61,7 +61,7 @@ impl Builder {
         self.taken.push([center[0], center[1], radius]);
     }
 
-    /// The bounding box of all features so far.
+    /// The bounding box of the material that the features so far add.
     pub fn bounds(&self) -> [f32; 4] {
         let whole = Recipe { materials: Vec::new(), features: self.features.clone(), grain_seed: 0 };
         whole.bounds()

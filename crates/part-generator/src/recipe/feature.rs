@@ -94,7 +94,7 @@ pub(crate) enum RippleKind {
     Hexagon,
 }
 
-/// The operation within the feature's shape.
+/// The operation of a feature.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Operation {
     /// Material from `bottom` to `top`.
@@ -106,7 +106,7 @@ pub(crate) enum Operation {
         /// Profile of the upper side's edge.
         edge: Edge,
     },
-    /// Like `Add` from the table, with a fillet of this radius onto lower material around it.
+    /// Like `Add` from the table, with a fillet onto lower material around it.
     Blend {
         /// Upper side.
         top: f32,
@@ -115,7 +115,7 @@ pub(crate) enum Operation {
         /// Radius of the fillet.
         fillet: f32,
     },
-    /// A sheet of this thickness whose upper side rises along x, across the shape.
+    /// A sheet whose upper side rises or falls along x, across the shape.
     Slope {
         /// Upper side at the smallest x.
         from: f32,
@@ -146,14 +146,14 @@ pub(crate) enum Operation {
         /// Whether the floor gets the feature's material: a machined seat.
         machined: bool,
     },
-    /// Raises the surface by this, or lowers it if negative, with slopes of this width.
+    /// Raises the surface, or lowers it if `by` is negative, with slopes at the edge of the shape.
     Emboss {
         /// Height of the step.
         by: f32,
         /// Width of the slope.
         width: f32,
     },
-    /// Changes the material but not the height: print, label, paint, a ground face.
+    /// Changes the material but not the height: print, label, mark.
     Paint,
 }
 
@@ -177,7 +177,7 @@ pub(crate) struct Feature {
     pub operation: Operation,
     /// Index of its material.
     pub material: u8,
-    /// Features of one group move together; of group 0, the body, only a corner, bend or shoulder moves.
+    /// Features of one group move together; of group 0, the body, only a corner, bend or end moves.
     pub group: u16,
 }
 

@@ -80,7 +80,7 @@ fn outline(builder: &mut Builder, size: f32, top: f32, edge: Edge, rng: &mut Pcg
         }
         2 => add(Shape::Disc { radius: (0.5 * half).clamp(12.0, 38.0) }, [0.0; 2], 0.0),
         3 => {
-            // A lever: two or three eyes joined by webs.
+            // A lever: two eyes joined by a web, sometimes with an arm.
             let (r0, r1) = (half * rng.uniform(0.16, 0.34), half * rng.uniform(0.12, 0.3));
             let bend = rng.uniform(-0.5, 0.5) * half;
             let ends = [[-half + r0, 0.0], [half - r1, bend]];
@@ -152,7 +152,7 @@ fn outline(builder: &mut Builder, size: f32, top: f32, edge: Edge, rng: &mut Pcg
             }
         }
         _ => {
-            // A trapezium or kite with clipped corners.
+            // An uneven quadrilateral with rounded corners.
             let (a, b) = (half * rng.uniform(0.2, 0.7), half * rng.uniform(0.2, 0.7));
             let shift = half * rng.uniform(-0.4, 0.4);
             let vertices = vec![[-half, -a], [half, -b + shift * 0.3], [half * rng.uniform(0.6, 1.0), b], [-half, a]];
@@ -194,7 +194,7 @@ fn bolt_circle(builder: &mut Builder, size: f32, material: u8, rng: &mut Pcg64Mc
     }
 }
 
-/// Cuts a hole, a slot, a window, a polygon, or a pocket.
+/// Cuts a hole, a slot, a window or a lobed opening, through the part or as a pocket.
 fn opening(builder: &mut Builder, size: f32, thickness: f32, material: u8, rng: &mut Pcg64Mcg) {
     let reach = size * rng.log_uniform(0.02, 0.12);
     let Some(center) = builder.room(reach * 1.2, rng) else { return };

@@ -6,13 +6,13 @@ use crate::{GeneratorError, PhotoConfig, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Condition {
-    /// One part, vertical view, soft light, any table, few other parts.
+    /// One part, vertical view, any table, few other parts; none of the other conditions.
     Nominal,
     /// The camera nearer or farther: 0.75 to 1.3 of the demonstration's distance.
     Distance,
     /// The camera tilted by 5 to 20 degrees.
     Tilt,
-    /// An object covers 10 to 40 % of the part.
+    /// An object covers about 10 to 40 % of the part.
     Cover,
     /// Little light and much noise.
     Dark,
@@ -68,7 +68,7 @@ impl Condition {
     }
 }
 
-/// Properties of scenes: probabilities and ranges, sampled independently for every picture.
+/// Properties of scenes. Probabilities and ranges are sampled independently for every picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
     /// Width of the picture, in pixels.
@@ -111,7 +111,7 @@ pub struct SceneConfig {
     pub glare_probability: f64,
     /// Probability that the picture is compressed as JPEG.
     pub jpeg_probability: f64,
-    /// Minimum fraction of a part's outline inside the picture when it is placed.
+    /// Minimum fraction of an instance's outline inside the picture, if such a position is found.
     pub min_inside_share: f64,
     /// Number of other parts to choose from.
     pub num_other_parts: usize,

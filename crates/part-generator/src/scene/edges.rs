@@ -57,7 +57,7 @@ pub(crate) fn smooth_edges(
     }
     let mut table_row = TableRow::default();
     let mut drawn: Vec<(usize, [f32; 3])> = Vec::new();
-    // The pixels' row in the picture, and for each body its lines of sight at the samples' heights.
+    // The pixels' row in the picture, and for each body its lines of sight at the y of each sample.
     let (mut rows_at, mut rows) = (usize::MAX, Vec::new());
     for (idx, _) in on_edge.iter().enumerate().filter(|(_, on_edge)| **on_edge) {
         let (x, y) = (idx % width, idx / width);

@@ -83,7 +83,6 @@ impl<'a> Layout<'a> {
             let angle = rng.angle();
             let distance = reach * rng.uniform(0.0, 0.9);
             let at = [middle[0] + angle.cos() * distance, middle[1] + angle.sin() * distance];
-            // The near end of a long cover is on the part, the far end outside.
             let body = self.centered(cover, at, rng.angle(), 0.0);
             let hidden = points.iter().filter(|&&place| is_over(&body, place)).count() as f32 / points.len() as f32;
             let error = (hidden - share).abs();

@@ -6,7 +6,7 @@ use super::color_grid::bilinear;
 use crate::random::Draw;
 use crate::recipe::Material;
 
-/// Side of the map of reflections.
+/// Side of the map of reflections, in texels.
 const SIDE: usize = 32;
 
 /// Blur of the maps, in texels, from a mirror to a matt surface.

@@ -169,7 +169,7 @@ impl Placement {
         [apart(x0, y0), apart(x1, y0), apart(x0, y1), apart(x1, y1)].into_iter().fold(0.0, f32::max)
     }
 
-    /// Whether all lines of sight within `reach` cells of the given one miss the part.
+    /// Whether all lines of sight within `reach` cells of the given one miss the part; false if that is not certain.
     #[inline]
     pub fn is_clear_around(&self, sight: &Sight, reach: f32) -> bool {
         let (level, top_mm) = (self.level(), self.part.relief.top_mm);

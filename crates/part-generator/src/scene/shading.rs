@@ -224,9 +224,9 @@ fn light_on_table(scene: &Scene, exposure: &Exposure, place: [f32; 2], open: f32
 
 /// Change of the light across the picture, and the shadow of an object outside.
 struct Exposure {
-    /// Per millimetre in x and in y.
+    /// Relative change per millimetre in x and in y.
     gradient: [f32; 2],
-    /// Per millimetre in x and in y, and at the origin: 0 to 1 across the shadow's edge.
+    /// Coefficients of x and y, per millimetre, and a constant: their sum rises from 0 to 1 across the shadow's edge.
     edge: [f32; 3],
     strength: f32,
 }

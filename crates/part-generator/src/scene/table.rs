@@ -246,7 +246,7 @@ impl Table {
         self.gloss_level = rng.whole(1, 3);
     }
 
-    /// The approximate mean colour: the light that walls and shiny parts get from below.
+    /// The approximate mean colour.
     pub fn mean(&self) -> [f32; 3] {
         self.base
     }

@@ -73,8 +73,8 @@ impl Sight {
 }
 
 impl View {
-    /// A camera that looks at the table's origin from `distance` millimetres, tilted by `tilt` radians from vertical in
-    /// the direction `azimuth`.
+    /// A camera that looks at the table's origin from `distance` millimetres, tilted by `tilt` radians from vertical
+    /// about the horizontal axis in the direction `azimuth` (radians from x to y).
     pub fn new(width: u32, height: u32, focal: f32, distance: f32, tilt: f32, azimuth: f32) -> Self {
         // Rotated about a horizontal axis (Rodrigues).
         let (axis_y, axis_x) = azimuth.sin_cos();

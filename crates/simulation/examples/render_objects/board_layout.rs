@@ -1,6 +1,6 @@
 //! Positions of all components on the circuit board as seen from above, in metres.
 
-/// Area covered by the textures of board and plastics.
+/// Side of the square that the textures of board and plastics cover.
 pub const SPAN: f64 = 0.11;
 /// Length of the board; its centre is beside the grasp (`MIDDLE_X`), because the connectors at -x are heavier.
 pub const LENGTH: f64 = 0.092;

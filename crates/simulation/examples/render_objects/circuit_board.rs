@@ -185,7 +185,7 @@ fn pins() -> TriangleMesh {
     mesh
 }
 
-/// A pan head with a slot.
+/// A pan head with a recess.
 fn screw_head() -> TriangleMesh {
     let mut mesh = lathe(
         &[
@@ -199,7 +199,7 @@ fn screw_head() -> TriangleMesh {
         ],
         28,
     );
-    // Bars leave a cross-shaped socket.
+    // A bar divides the recess.
     let bar = box_solid(0.0036, 0.0006, 0.0019, 0.0002);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2 / 2.0);
     mesh.append(&bar.transformed(&Isometry3::from_parts(Translation3::identity(), turn)));

@@ -40,7 +40,7 @@ pub fn cranfield_face() -> Part {
     holes.extend(round_places.map(|(x, y)| circle(Point2::new(x, y), 0.0065, 28)));
     let plate = extrude(&outline(), &holes, THICKNESS, 0.0010);
 
-    // Collars around the seats lengthen their guidance, as on printed plates.
+    // Collars make the seats deeper, as on printed plates.
     let collar = |inner: f64, outer: f64, height: f64, x: f64, y: f64| {
         moved(ring(inner, outer, height + 0.0005, 0.0006, 40), x, y, THICKNESS - 0.0005)
     };

@@ -1,4 +1,4 @@
-//! Injection line of a Diesel engine: a bent steel tube with two union nuts of different make and a clip.
+//! Injection line of a Diesel engine: a bent steel tube with two different unions and a clip.
 
 use std::f64::consts::PI;
 

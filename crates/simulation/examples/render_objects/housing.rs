@@ -29,7 +29,7 @@ const LUG_LOWER: f64 = 0.00012;
 const LUG: (f64, f64) = (0.0375, 0.0255);
 const LUG_RADIUS: f64 = 0.0066;
 const BOLT_RADIUS: f64 = 0.0028;
-/// Feet at both ends: centre, and extent.
+/// Feet at both ends: centre and end along x, and height.
 const FOOT_CENTRE: f64 = 0.050;
 const FOOT_END: f64 = 0.065;
 const FOOT_HEIGHT: f64 = 0.006;

@@ -23,7 +23,7 @@ const CUTS: [f64; 6] = [0.0012, 0.0028, 0.0016, 0.0030, 0.0008, 0.0022];
 const FIRST_CUT: f64 = 0.0255;
 const CUT_SPACING: f64 = 0.0042;
 const CUT_HALF_FLAT: f64 = 0.0006;
-/// Rise of a cut's flanks.
+/// Slope of a cut's flanks.
 const CUT_SLOPE: f64 = 1.15;
 const EMBLEM: (f64, f64) = (-0.0040, 0.0078);
 

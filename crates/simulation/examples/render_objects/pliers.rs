@@ -23,7 +23,7 @@ const JAW_TIP: f64 = 0.0520;
 const GAP: f64 = 0.00025;
 const HANDLE_MIDDLE: f64 = 0.0054;
 const HANDLE: [(f64, f64); 4] = [(-0.0240, 0.0108), (-0.0500, 0.0205), (-0.0800, 0.0225), (-0.1085, 0.0160)];
-/// Area covered by the steel's texture.
+/// Side of the square that the steel's texture covers.
 const SPAN: f64 = 0.10;
 
 /// The part.
@@ -188,7 +188,7 @@ fn sleeve_half_size(part: f64) -> (f64, f64) {
     ((0.0044 + guard + belly) * fade, (0.0052 + 0.2 * belly) * fade)
 }
 
-/// Half width and half height of the inlay on a sleeve, which it exceeds on top.
+/// Half width and half height of the inlay on a sleeve; the inlay is higher than the sleeve.
 fn inlay_half_size(part: f64) -> (f64, f64) {
     let fade = (1.0 - (2.0 * part - 1.0).abs().powi(4)).max(0.02).sqrt();
     (0.0031 * fade, 0.0050 + 0.0008 * fade)

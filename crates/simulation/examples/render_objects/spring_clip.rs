@@ -1,5 +1,5 @@
-//! Spring clip bent of one strip of sheet steel: upper leaf with a bead and a vinyl-covered lip, lower leaf with a
-//! screwing tab.
+//! Spring clip bent of one strip of sheet steel: upper leaf with a bead and a vinyl-covered lip, lower leaf with a tab
+//! for screws.
 
 use nalgebra::{Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_simulation::objects::RotationalSymmetry;

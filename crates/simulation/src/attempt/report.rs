@@ -9,7 +9,8 @@ use crate::objects::GraspError;
 /// The record of an attempt.
 #[derive(Debug, Clone)]
 pub struct AttemptReport {
-    /// The outcome: held if, after lifting and waiting, the part was high enough and between both fingers.
+    /// The outcome: held if, after lifting and waiting, the part was high enough and between both fingers; if it was to
+    /// be put down, it must also be at its place.
     pub outcome: GraspOutcome,
     /// The seed of the start configuration.
     pub seed: u64,
@@ -25,7 +26,7 @@ pub struct AttemptReport {
     pub place_error: Option<GraspError>,
     /// Amplitude of the hand's swing after lifting, in metres; `None` if the hand was not shaken.
     pub shake_amplitude_m: Option<f64>,
-    /// The verdict of the hand's width and force after each of the last steps; see [`sdg_robot::GraspReport`].
+    /// The verdict of the hand's width and force after closing, lifting and holding; see [`sdg_robot::GraspReport`].
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// Height of the part's lowest point above the table at the end, in metres.
     pub object_height_m: Option<f64>,

@@ -1,4 +1,4 @@
-//! Parts that resemble a given part: mirrored, with one feature moved, or with another size.
+//! Parts that resemble a given part: mirrored, with one feature changed, or with another size.
 //!
 //! ```text
 //! ObjectSpec ─> meshes, marks, collision shapes, inertia changed together ─> ObjectSpec with another name
@@ -19,7 +19,7 @@ use crate::error::Result;
 pub enum LookAlikeKind {
     /// The mirror image in a vertical plane.
     Mirrored,
-    /// The part with one feature moved.
+    /// The part with one feature moved or, if no feature can be moved, with a region stretched or a narrower bore.
     FeatureMoved,
     /// The whole part in another size.
     Scaled {
@@ -66,8 +66,8 @@ const CELL_M: f64 = 0.001;
 /// Smallest height difference that is visible from above, in metres.
 const SAME_HEIGHT_M: f64 = 0.001;
 /// Minimum difference between a part and its mirror image, at the angle of greatest similarity, for a mirrored
-/// look-alike. Of the shipped parts, the pliers (1.3 %) and the housing (2.0 %) are below it; the key (3.4 %, because
-/// of its cuts) and all other parts that differ from their mirror image (20 % and more) are above it.
+/// look-alike. Of the shipped parts that differ from their mirror image, the pliers (1.3 %) and the housing (2.0 %) are
+/// below it; the key (3.4 %, because of its cuts) and the others (20 % and more) are above it.
 const MIN_MIRROR_DIFFERENCE: f64 = 0.03;
 
 impl ObjectSpec {
@@ -80,7 +80,7 @@ impl ObjectSpec {
         Ok(LookAlikeKind::ALL.into_iter().filter(|kind| *kind != LookAlikeKind::Mirrored || is_chiral).collect())
     }
 
-    /// A look-alike of this part; `seed` determines the moved feature and its movement.
+    /// A look-alike of this part; `seed` determines the change of a feature.
     ///
     /// # Errors
     /// [`crate::SimulationError::File`] for a part whose shapes are not given as OBJ meshes.
@@ -195,7 +195,7 @@ impl ObjectSpec {
         }
     }
 
-    /// Replaces the visible meshes; the map gets the index of the geom.
+    /// Replaces the visible meshes; `map` gets the index of the mesh.
     pub(super) fn map_meshes(&mut self, map: impl Fn(usize, ObjMesh) -> ObjMesh) -> Result<()> {
         let meshes = self.visual_meshes()?;
         for (idx, visual) in meshes.into_iter().enumerate() {

@@ -214,8 +214,7 @@ impl ObjectSpec {
         }
     }
 
-    /// The part's MJCF at a pose: body `object`, joint `object_joint`, geoms `object_visual_*` and
-    /// `object_collision_*`.
+    /// The part's MJCF at a pose, with the body `object` and its joint `object_joint`.
     pub fn fragment(&self, base_from_object: &Isometry3<f64>) -> MjcfFragment {
         let placed = format!("<body name=\"object\" {}>", pose_attributes(base_from_object));
         MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }

@@ -26,7 +26,7 @@ pub(crate) struct ObjMesh {
 impl ObjMesh {
     /// Reads the lines `v`, `vt`, `vn` and `f` of an OBJ text of triangles; other lines are ignored.
     ///
-    /// The error contains the number and text of the invalid line.
+    /// The error contains the number and text of an invalid line.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut mesh = Self { positions: Vec::new(), texcoords: Vec::new(), normals: Vec::new(), faces: Vec::new() };
         for (number, line) in text.lines().enumerate() {

@@ -21,7 +21,7 @@ impl ObjectSpec {
     ///
     /// # Errors
     /// [`SimulationError::File`] for a part without meshes, for meshes that are not OBJ triangles, and for geoms that
-    /// rotate or scale their mesh.
+    /// move, rotate or scale their mesh.
     pub(super) fn visual_meshes(&self) -> Result<Vec<VisualMesh>> {
         let fail = |reason: String| SimulationError::File { path: format!("{}/object.xml", self.name).into(), reason };
         let tags = tags(&self.mjcf);

@@ -115,7 +115,7 @@ pub(super) fn scaled_pieces(kind: DistractorKind, seed: u64, scale: f64) -> Vec<
     pieces
 }
 
-/// The pieces in the distractor's frame: z points up in the resting pose, and x and y are centred on the origin.
+/// The pieces in the distractor's frame: z points up in the resting pose, and the origin is near the centre.
 fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
     let rng = &mut Pcg64Mcg::seed_from_u64(seed);
     let any = Finish::any(rng);

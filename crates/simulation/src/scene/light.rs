@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::fragment::MjcfFragment;
 use crate::shapes::texture::Color;
 
-/// The centre of the table area in the camera's view, at which lamps are aimed (metres, base frame).
+/// A point near the centre of the camera's view, at which lamps are aimed (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 
 /// Radius around the aim within which shadows are rendered, in metres: slightly larger than the wrist camera's view.

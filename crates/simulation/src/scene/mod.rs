@@ -182,7 +182,7 @@ const DISTRACTOR_MARGIN_M: f64 = 0.05;
 /// At most `count` distractors of a seed with centres between bounds in the base frame, in metres.
 pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
-    // In a range narrower than the margins, distractors are placed near its centre.
+    // The ends of a range narrower than both margins are exchanged.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
     let config = VariationConfig {
         object_x_m: within(x_m),
@@ -264,7 +264,6 @@ mod tests {
                 }
             }
         }
-        // Nearly all distractors find room.
         assert!(placed >= 3 * 8 * 5, "{placed} of 144");
     }
 }

@@ -20,7 +20,7 @@ pub struct SeenPart {
 }
 
 impl SeenPart {
-    /// The extruded outline, in a colour that no shipped part has.
+    /// The extruded outline, in orange.
     pub(crate) fn fragment(&self) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();
         let [bottom_m, top_m] = self.z_m;

@@ -360,9 +360,9 @@ mod tests {
         let corners = [Point3::new(0.0, 0.0, 0.01), Point3::new(0.1, 0.0, 0.01), Point3::new(0.1, 0.1, 0.01)];
         let (radius, bend) = (0.004, 0.02);
         let tube = sweep(&rounded_path(&corners, bend, 12), radius, 32);
+        // Pappus: the volume is the area times the length of the centre's path.
         let length = 2.0 * (0.1 - bend) + bend * PI / 2.0;
         volume_is(&tube, PI * radius * radius * length);
-        // Pappus: the volume is the area times the length of the centre's path.
         let (low, high) = tube.bounds();
         assert_relative_eq!(high.x, 0.1 + radius, epsilon = 2e-4);
         assert_relative_eq!(low.z, 0.01 - radius, epsilon = 1e-9);

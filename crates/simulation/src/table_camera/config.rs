@@ -26,15 +26,15 @@ pub struct TableCameraConfig {
     pub duration_secs: Option<f64>,
     /// Number of instances of the part, 1 to 4 (`count`).
     pub count: usize,
-    /// Another part beside the first (`beside`): the name of a part, or a look-alike of the first: `mirrored`,
+    /// Another part on the table (`beside`): the name of a part, or a look-alike of [`Self::part`]: `mirrored`,
     /// `feature-moved`, or a size such as `0.9`.
     pub beside: Option<String>,
     /// Number of distractors (`things`).
     pub num_things: usize,
-    /// Interval in which the first part is not on the table, in seconds; afterwards it is at another position (`hide`,
-    /// as `2..3`).
+    /// Interval in which the first instance is not on the table, in seconds; afterwards it is at another position
+    /// (`hide`, as `2..3`).
     pub hidden_secs: Option<Range<f64>>,
-    /// Interval in which a card covers the first part, in seconds (`cover`, as `2..3`).
+    /// Interval in which a card covers the first instance, in seconds (`cover`, as `2..3`).
     pub covered_secs: Option<Range<f64>>,
     /// Standard deviation of the sensor's noise in grey values (`noise`).
     pub noise: f64,

@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(shown, [true, true, false, false, true, false, true, true]);
         let moved = (seen[4].truths[0].grasp.tcp - seen[1].truths[0].grasp.tcp).norm();
         assert!(moved > 0.02, "{moved}");
-        // The picture shows the part at its true position: there, its pixels differ from those of the bare table.
+        // The picture shows the part at its true position: that pixel changes if the part is hidden or covered.
         let at = |view: &TableView, of: &TableView| {
             let center = of.truths[0].grasp.line.center();
             view.picture.get_pixel(center.x as u32, center.y as u32).0

@@ -15,11 +15,11 @@ use crate::scene::{
 };
 use crate::views::base_from_look_camera;
 
-/// The table area that the camera shows from its usual height, in the base frame.
+/// The table area for objects, inside the camera's view from its usual height, in the base frame.
 const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };
 /// Width along y of the strip with the distractors, in metres.
 const STRIP_M: f64 = 0.10;
-/// z of hidden objects, below the floor, in metres.
+/// z of hidden objects, below the table, in metres.
 const AWAY_M: f64 = -3.0;
 /// Half of the card's side, in metres.
 const CARD_HALF_M: f64 = 0.06;
@@ -63,7 +63,7 @@ pub(super) fn scene(config: &TableCameraConfig, spec: &ObjectSpec) -> SceneVaria
     scene
 }
 
-/// The scene with floor, card and camera.
+/// The MJCF of the scene, the card and the camera.
 pub(super) fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> String {
     let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, RenderConfig::default().height).to_degrees();
     let look = base_from_look_camera();
@@ -87,7 +87,7 @@ pub(super) fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> Strin
     text
 }
 
-/// Renames the body of a part, so that another part can be in the same scene.
+/// Renames the objects and files of a part, so that another part can be in the same scene.
 pub(super) fn renamed(fragment: MjcfFragment) -> MjcfFragment {
     let sections = fragment.sections.replace("=\"object", "=\"beside").replace(" file=\"", " file=\"beside_");
     let files = fragment

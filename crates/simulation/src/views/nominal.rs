@@ -102,7 +102,8 @@ pub fn test_views(
     })
 }
 
-/// A demonstration of a part: one picture in even light, with marks as a careful person makes them.
+/// A demonstration of a part: one picture in even light, with the true marks and an outline like that of a careful
+/// person.
 #[derive(Debug, Clone)]
 pub struct DemonstrationView {
     /// The picture and its camera.
@@ -111,7 +112,7 @@ pub struct DemonstrationView {
     pub truth: GraspTruth,
     /// The pixels that show the part.
     pub mask: Mask,
-    /// The outer outline as marked by a person.
+    /// The outer outline, with as few vertices as a person would click.
     pub outline: Polygon,
 }
 
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
     use crate::render::RenderConfig;
 
-    /// Largest distance in pixels between a mark's projection and the axis of the rendered part.
+    /// Largest distance in pixels between the centre of the marks and the axis of the rendered part.
     const MARK_TOLERANCE_PX: f64 = 1.5;
 
     /// Largest mean distance between a careful person's outline and the true one, in pixels.

@@ -81,7 +81,7 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
 
 /// Smallest and largest tilt from straight down, in degrees.
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
-/// Largest distance between the part and the point at which the camera is aimed, in metres.
+/// Largest distance in x and in y between the part and the point at which the camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
 /// Maximum number of poses that are tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;
@@ -217,7 +217,7 @@ mod tests {
             assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
             let empty = SceneVariation { object: None, ..scene_of(&spec, camera) };
             let without = draw(empty, &first.view.camera).unwrap();
-            // The centre of the pixels that the part changed is closer to its marks than the part's size.
+            // The centre of the pixels that differ is less than the part's size from the marks.
             let changed: Vec<Vector3<f64>> = first
                 .view
                 .image

@@ -193,7 +193,7 @@ impl Workcell {
         self.panda_ids.finger_position_m(&self.data).iter().sum()
     }
 
-    /// The wrist camera's pose (optical frame) on the hand.
+    /// The wrist camera's pose (optical frame) relative to the tool centre point.
     pub fn tcp_from_camera(&self) -> Isometry3<f64> {
         self.tcp_from_camera
     }

@@ -32,7 +32,7 @@ impl Workcell {
         }
     }
 
-    /// The geom that each pixel of the same camera's rendered picture shows, before the lens is applied.
+    /// The geom at each pixel of the rendered picture of [`Self::wrist_view`], before the lens is applied.
     ///
     /// # Errors
     /// As for [`Renderer::segmentation`].

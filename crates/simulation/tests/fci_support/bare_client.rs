@@ -1,4 +1,4 @@
-//! A client of bare sockets, which can be disconnected at any moment.
+//! A simple client of the robot's protocol, for tests of faults.
 
 use std::io::Write;
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -13,7 +13,7 @@ use sdg_fci::wire::{
 
 /// Speed of joint 1, rad/s, when a fault occurs.
 pub const SPEED: f64 = 0.5;
-/// Accelerates joint 1 up to [`SPEED`], millisecond by millisecond.
+/// Joint velocities, rad/s, at a time of a motion: joint 1 accelerates to [`SPEED`] in 0.2 s.
 pub fn velocity_after(ms: u64) -> [f64; 7] {
     let ramp = (ms as f64 / 200.0).min(1.0);
     [SPEED * 0.5 * (1.0 - (std::f64::consts::PI * ramp).cos()), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]

@@ -22,13 +22,13 @@ pub fn serve_panda() -> (Server, Robot) {
     (server, robot)
 }
 
-/// A client of a server.
+/// Connects a client to a server.
 pub fn connect(server: &Server) -> Robot {
     let address: SocketAddr = server.robot_address();
     Robot::connect(&address.to_string(), &RobotConfig::default()).unwrap()
 }
 
-/// A client of a server's hand.
+/// Connects a client to a server's hand.
 pub fn connect_hand(server: &Server) -> Hand {
     Hand::connect(&server.hand_address().to_string(), &HandConfig::default()).unwrap()
 }

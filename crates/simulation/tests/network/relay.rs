@@ -43,7 +43,7 @@ fn relay(listener: &TcpListener, robot: SocketAddr, change: ChangeState, pass: P
     client.set_nodelay(true).unwrap();
     server.set_nodelay(true).unwrap();
     let [to_client, to_server] = [(); 2].map(|()| Arc::new(UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap()));
-    // The client's listening address, and the robot's sending address.
+    // The client's UDP port, and the robot's sending address.
     let (client_port, robot_udp) = (Arc::new(Mutex::new(0)), Arc::new(Mutex::new(None)));
 
     let (states, sends, port, source) = (to_server.clone(), to_client.clone(), client_port.clone(), robot_udp.clone());

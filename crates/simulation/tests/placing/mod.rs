@@ -65,7 +65,7 @@ pub fn cell(spec: &ObjectSpec, seed: u64, lying: &[Isometry3<f64>]) -> Workcell 
     cell
 }
 
-/// Perception that knows the true poses, but not the table's height.
+/// Perception that knows the true poses, but places them too low by an error of the table's height.
 struct Told<F> {
     finder: F,
     lower_m: f64,
@@ -112,7 +112,7 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     let limits = Workcell::safety_limits();
     let lying: Vec<Isometry3<f64>> =
         cell.config().scene.instances.iter().map(|instance| instance.base_from_object).collect();
-    // The parts in the scene are also known.
+    // The sequence knows the parts that are already placed.
     let known = |instance: &PlacedObject| LyingPart {
         base_from_part: marked_grasp(&instance.spec, &instance.base_from_object).base_from_tcp,
         shape: part_shape(&instance.spec).unwrap(),
@@ -131,7 +131,7 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
 }
 
 /// Grasps the part of a cell on a table whose given height is too low, compliantly or in joint positions. Returns also
-/// whether the part is lifted, and the largest vertical force on the hand until it closed, N.
+/// whether the part is lifted, and the largest vertical force on the hand until it closed, N (NaN over the network).
 pub fn grasp_on_other_table(
     cell: Workcell,
     at: Where,

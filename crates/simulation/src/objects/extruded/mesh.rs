@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_concave_part_is_cut_into_spans() {
-        // A U-shaped outline: at x = 1.5 there are two intervals.
+        // A U-shaped outline: between x = 1 and 3 there are two intervals.
         let u = [(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (2.0, 3.0), (2.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]
             .map(|(y, x)| Point2::new(x, y));
         let found = strips(&u, &[0.0, 1.0, 3.0]);

@@ -26,7 +26,7 @@ use crate::panda::FINGERTIP_BEYOND_TCP_M;
 /// Smallest height of the tool centre point above the table: the finger tips are then 2 mm above the table. No shipped
 /// part has a smaller grasp height.
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
-/// Largest height of a part above the tool centre point; a higher part would touch the palm.
+/// Largest height of a part above the tool centre point; a higher part could touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
 /// Number of strips of boxes along the part's length. Chosen by hand, so that the jaws' pads, 2 cm wide, touch several
 /// boxes.

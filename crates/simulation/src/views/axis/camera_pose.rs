@@ -22,7 +22,7 @@ pub(super) const TILTS_DEG: Range<f64> = 5.0..20.0;
 /// Tilts of the camera on the axis of slants, in degrees.
 pub(super) const SLANTS_DEG: Range<f64> = 0.0..35.0;
 
-/// Largest distance between the part and the point at which a tilted camera is aimed, in metres.
+/// Largest distance in x and in y between the part and the point at which a tilted camera is aimed, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.06;
 
 /// Maximum number of directions of tilt that are tried until the arm reaches the camera's pose and the part is in the

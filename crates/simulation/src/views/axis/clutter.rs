@@ -24,7 +24,7 @@ const MAX_TRIES: usize = 8;
 /// Side of a cell of the views from above, in metres: two objects touch if their cells are neighbours.
 const CELL_M: f64 = 0.001;
 
-/// Distance of a distractor from the part at its start, in metres.
+/// Distance at which a distractor starts, from its aim on the part, in metres.
 const START_M: f64 = 0.32;
 
 /// Corner of the monitored area of the table, in metres.

@@ -20,7 +20,7 @@ const COVERED_SHARES: std::ops::Range<f64> = 0.10..0.40;
 /// Tolerance of the measured fraction: half of a stratum, plus the steps of the raster.
 const SHARE_TOLERANCE: f64 = 0.02;
 
-/// Distractors that can lie on another part: flat or long ones.
+/// Distractors that can lie on another part: mostly flat or long ones.
 const KINDS: [DistractorKind; 10] = [
     DistractorKind::Plate,
     DistractorKind::Flange,
@@ -36,7 +36,7 @@ const KINDS: [DistractorKind; 10] = [
 
 /// Maximum number of covers that are tried until one covers enough.
 const MAX_COVERS: u32 = 60;
-/// First step from the estimated position, in metres.
+/// Largest step of the cover in the search for its position, in metres.
 const FIRST_STEP_M: f64 = 0.003;
 /// Maximum number of pictures for finding a cover's position.
 const MAX_MEASUREMENTS: usize = 8;
@@ -201,7 +201,7 @@ fn lay_over(
         }
         if share > wanted {
             near_m = distance_m;
-            // The first steps are small, because the estimate is usually close.
+            // The steps are small, because the estimate is usually close.
             distance_m = (distance_m + FIRST_STEP_M).min(0.5 * (distance_m + far_m));
         } else {
             far_m = distance_m;

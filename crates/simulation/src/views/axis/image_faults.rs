@@ -31,7 +31,7 @@ const BLUR_POINTS: usize = 64;
 
 /// Range of the logarithm of the ratio by which a colour cast changes red relative to blue.
 const CAST_LOG_RATIOS: std::ops::Range<f64> = 0.15..0.9;
-/// Fraction of this logarithm by which green changes relative to red and blue.
+/// Largest fraction of this logarithm by which green changes relative to red and blue.
 const GREEN_SHARE: f64 = 0.35;
 
 /// Linear light of a picture, row by row, three channels per pixel.
@@ -222,8 +222,8 @@ mod tests {
             let counts: Vec<f64> = (0..40_000).map(|_| poisson(mean, &mut rng, &mut normal)).collect();
             let found = counts.iter().sum::<f64>() / counts.len() as f64;
             let variance = counts.iter().map(|count| (count - found).powi(2)).sum::<f64>() / counts.len() as f64;
-            // The tolerances are four standard errors: sqrt(mean / n) for the mean, about mean * sqrt(2 / n) for the
-            // variance.
+            // The tolerances are four standard errors: sqrt(mean / n) for the mean, sqrt(mean * (1 + 2 * mean) / n) for
+            // the variance.
             assert!((found - mean).abs() < 4.0 * (mean / 4e4).sqrt(), "{mean}: {found}");
             assert!((variance - mean).abs() < 4.0 * (mean * (1.0 + 2.0 * mean) / 4e4).sqrt(), "{mean}: {variance}");
         }

@@ -20,7 +20,7 @@ const TRIES_PER_INSTANCE: usize = 60;
 /// Maximum number of attempts to place all instances.
 const MAX_ROUNDS: usize = 60;
 
-/// An ordinary scene with two more instances of the part and up to three distractors.
+/// A scene with light and table as usual, three instances of the part and up to three distractors.
 pub(super) fn draw_three(request: &mut Request<'_>) -> Result<Drawn> {
     let config = VariationConfig { distractors: 0..=3, ..VariationConfig::default() };
     let mut scene = SceneVariation::sample(Some(request.spec), &config, request.scene_seed);

@@ -5,10 +5,10 @@
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: the axis's parameter changes
-//! from one end of its range in picture 0 to the other end in the last picture, at random within each stratum, so that
-//! 20 pictures cover the whole range evenly. The same part, axis, number and seed give the same picture, bit for bit.
-//! All pictures are taken by the wrist camera on the arm, as in an attempt.
+//! An axis has [`PICTURES_PER_AXIS`] pictures. The range of the axis's parameter is divided into equal parts, the
+//! **strata**, and each picture has a random value of its own stratum, so that the pictures cover the range evenly. The
+//! same part, axis, number and seed give the same picture, bit for bit. All pictures are taken by the wrist camera on
+//! the arm, as in an attempt.
 
 mod axis_name;
 mod camera_pose;
@@ -113,7 +113,7 @@ mod tests {
     use crate::scene::PlacedObject;
     use crate::shapes::footprint;
 
-    /// Largest distance in pixels between the centres of the rendered part and of its projected top: a wall of 12 mm
+    /// Largest distance in pixels between the centres of the rendered part and of its projected top. A wall of 12 mm
     /// seen from 20 degrees off the vertical covers 4 px on one side and moves the centre by half of that; the rest
     /// allows for the raster of a millimetre.
     const MIDDLE_TOLERANCE_PX: f64 = 3.0;
@@ -173,7 +173,7 @@ mod tests {
             let apart = (middle(&projected) - middle(&shown)).norm();
             assert!(apart < MIDDLE_TOLERANCE_PX, "{name} {axis} {number}: {apart} px");
             let line = truth.grasp.line;
-            // The marks are at their true position, within the part's outline.
+            // The marks are near the centre of the rendered part.
             assert!((line.center().coords - middle(&shown)).norm() < 60.0, "{name} {axis}: {:?}", line.center());
             let range = if axis == Axis::Tilt { 5.0..20.0 } else { 0.75..1.3 };
             assert!(range.contains(&drawn.parameter.value), "{}", drawn.parameter.description);
