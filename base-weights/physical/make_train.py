@@ -25,7 +25,7 @@ import photo
 import quotas
 import scene
 import surfaces
-from bodies import Body, grasp_ends
+from bodies import Body, grasp_ends, lift
 from camera import WIDTH, cast
 from make_sets import Group, SetMaker, Setting, choose_table, write_json
 from meshes import rot
@@ -75,7 +75,7 @@ class TrainMaker(SetMaker):
         self.spec = dict(cam=(f * diagonal / rng.uniform(115, 185), fov), chiral=True, sym=1)
         self.others = []
         self.pool = [Body.get(f"c_tune_{c}", make) for c, make in clutter.TUNE.items()]
-        self.marks = grasp_ends(self.body, self.spec)
+        self.marks, self.lift = grasp_ends(self.body, self.spec), lift(self.body, self.spec)
         self.bsdfs = {}
         self.truth = []
         self.height, self.fov = self.spec["cam"]

@@ -337,6 +337,11 @@ fn the_submit_script_is_one_that_bash_reads() {
     for part in ["--requeue", "--mem=1500M", "--partition=cpu", "--dependency=\"afterany:", "--seed 3", LOOK] {
         assert!(script.contains(part), "expected {part} in {script}");
     }
+    let listed =
+        ["evaluate", "--models", "S", "--objects", "pendulum, rod_end", "--submit", "slurm", "--json", "--out", &out];
+    let printed = json(&sdg(&listed));
+    let script_of_two = printed["script"].as_str().unwrap();
+    assert!(script_of_two.contains("--objects pendulum,rod_end --"), "without the space: {script_of_two}");
     let path = folder.text("submit.sh", script);
     assert!(Command::new("bash").args(["-n", &path]).status().unwrap().success());
     assert!(!Path::new(&out).exists(), "printing makes nothing");

@@ -85,10 +85,10 @@ pub struct EvaluateArgs {
     )]
     pub device: ComputeBackend,
     /// The grasp models, by letter or name; default: all
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = trimmed)]
     pub models: Vec<String>,
     /// The parts: names of folders in datasets/; default: the paper's eight
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = trimmed)]
     pub objects: Vec<String>,
     /// Number of grasp attempts of each model on each part
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
@@ -110,6 +110,7 @@ pub struct EvaluateArgs {
         long,
         value_name = "NAMES",
         value_delimiter = ',',
+        value_parser = trimmed,
         num_args = 0..=1,
         conflicts_with_all = ["unverified"],
         group = "sheet",
@@ -123,6 +124,7 @@ pub struct EvaluateArgs {
         long,
         value_name = "NAMES",
         value_delimiter = ',',
+        value_parser = trimmed,
         num_args = 0..=1,
         conflicts_with_all = ["unverified", "axes"],
         group = "sheet",
@@ -188,3 +190,8 @@ const AXES: &str = "Axes and errors";
 
 /// The heading of the options of `--pictures` in the help.
 const PICTURES: &str = "Labelled pictures";
+
+/// A name of a list, which may have a space after each comma.
+fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
+    Ok(name.trim().to_owned())
+}

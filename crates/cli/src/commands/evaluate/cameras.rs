@@ -65,7 +65,7 @@ fn sets(names: &[String]) -> Result<Vec<PictureSet>> {
     }
     let known = || all.iter().map(|set| set.name()).collect::<Vec<_>>().join(", ");
     let of = |name: &String| {
-        let found = all.iter().copied().find(|set| set.name() == name.trim());
+        let found = all.iter().copied().find(|set| set.name() == name);
         found.ok_or_else(|| Usage(format!("--cameras: expected a set out of {}, found {name}", known())).into())
     };
     names.iter().map(of).collect()

@@ -16,7 +16,7 @@ pub fn models(names: &[String], otherwise: &[ModelKind]) -> Result<Vec<ModelKind
     }
     let mut models = Vec::new();
     for name in names {
-        let model = name.trim().parse().map_err(|error: UnknownModel| Usage(format!("--models: {error}")))?;
+        let model = name.parse().map_err(|error: UnknownModel| Usage(format!("--models: {error}")))?;
         if models.contains(&model) {
             return Err(Usage(format!("--models: expected each model once, found {model} again")).into());
         }

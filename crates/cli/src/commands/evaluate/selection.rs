@@ -39,7 +39,7 @@ pub fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Res
     let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
     let mut objects: Vec<ObjectSpec> = Vec::new();
     for name in names {
-        let object = part_named("--objects", name.trim())?;
+        let object = part_named("--objects", &name)?;
         if objects.iter().any(|known| known.name == object.name) {
             return Err(Usage(format!("--objects: expected each part once, found {} again", object.name)).into());
         }

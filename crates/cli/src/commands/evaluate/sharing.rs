@@ -212,7 +212,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let folder = std::path::absolute(&args.out)?;
     let program = std::env::current_exe().context("the program's own path")?;
     let arguments = protocol::command(args, &asked.settings);
-    // The arguments are expected to contain no spaces.
+    // No argument contains a space: names are trimmed when they are parsed.
     let arguments = arguments.split(' ').skip(1).map(str::to_owned);
     let command: Vec<String> = [program.display().to_string()].into_iter().chain(arguments).collect();
     let job = SlurmJob {
