@@ -13,7 +13,7 @@ use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 /// a photo does not show.
 ///
 /// # Errors
-/// The ray does not meet that height, or the part is wider than the hand opens.
+/// The ray through the grasp does not meet that surface, or the part is wider than the hand opens.
 pub fn grasp_pose(object: &ObjectSpec, camera: &PosedCamera, grasp: &PlanarGrasp) -> Result<GraspPose, GraspError> {
     let plane = GraspPlane { mark_height_m: object.seen_height_m, grasp_height_m: object.grasp_height_m };
     GraspPose::from_planar(camera, grasp, &plane, LARGEST_JAW_WIDTH_M)

@@ -55,7 +55,7 @@ pub fn board() -> Board {
     Board::new(9, 6, 0.025).expect("a board")
 }
 
-/// The board's pose in each picture: at positions all over the picture, tilted in every direction by up to 40 degrees,
+/// The board's pose in each picture: at positions all over the picture, tilted by up to 40 degrees about its x and y,
 /// completely visible.
 pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
     let board = board();
