@@ -14,7 +14,7 @@ pub struct Annotation {
     /// The two points of the grasp, if marked.
     pub grasp: Option<GraspLine>,
     /// Opening of the jaws where they close on the part, in pixels, if marked; otherwise it is measured from the
-    /// outline.
+    /// outline or the box.
     pub jaw_width: Option<f64>,
     /// The outline, if drawn.
     pub outline: Option<Polygon>,

@@ -11,7 +11,7 @@ use super::random::{Stream, sample_rng};
 use super::*;
 use crate::{Annotation, Demonstration, NUM_KEYPOINTS};
 
-/// Tolerance between a drawn dot and its keypoint: half a pixel, blur and noise included.
+/// Maximum distance between a drawn dot and its keypoint.
 const DOT_TOLERANCE_PX: f64 = 0.5;
 
 /// A red L with white dots at both ends of its grasp line, on a dark grey table.

@@ -1,4 +1,4 @@
-//! Small evaluations in the simulator (the protocol, axes and errors, cameras), each with one part and model S, which is
+//! Small evaluations in the simulator (protocol, axes and errors, cameras), each with one part and model S, which is
 //! taught in a moment.
 
 use std::fs;
