@@ -188,7 +188,7 @@ impl CalibratedCamera {
     /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept.
     ///
     /// # Errors
-    /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.
+    /// [`CameraFileError::NotUpdatable`] if the file does not have ROS's layout.
     pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
         let updated = merged(existing, &SECTIONS, &self.sections());
         match Self::from_yaml(&updated) {

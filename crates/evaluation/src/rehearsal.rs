@@ -192,7 +192,7 @@ impl Rehearsal<'_> {
     /// A grasp that cannot be executed (wider than the hand, off the table) is a failed attempt.
     ///
     /// # Errors
-    /// Errors of the simulation.
+    /// The simulation fails, or the model's lengths or the place are invalid.
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let mut variation = VariationConfig::default();
