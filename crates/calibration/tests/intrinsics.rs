@@ -154,7 +154,7 @@ fn forty_pictures_leave_the_noise_of_their_corners() {
 fn a_bad_picture_is_named_and_left_out() {
     let camera = CAMERAS[0].1;
     let mut views = synthetic(&camera, 0.05, 3);
-    // A board bent like a loose sheet: by 3 mm at its centre, seen from the side.
+    // The corners of a bent board, as of a loose sheet: shifted by up to 6 pixels in its middle column.
     for seen in &mut views[4] {
         let x = f64::from(seen.corner[0]) / 4.5 - 1.0;
         seen.pixel += nalgebra::Vector2::new(3.0, 5.0) * (1.0 - x * x);
