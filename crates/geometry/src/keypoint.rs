@@ -23,7 +23,7 @@ pub struct Keypoint {
     pub x: f64,
     /// Pixels down.
     pub y: f64,
-    /// Whether the position is valid.
+    /// Whether the point is labelled and visible.
     pub visibility: Visibility,
 }
 
