@@ -9,8 +9,8 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose height
-/// a photo does not show.
+/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose
+/// height a photo does not show.
 ///
 /// # Errors
 /// The ray through the grasp does not meet that surface, or the part is wider than the hand opens.
