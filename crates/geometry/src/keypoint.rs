@@ -76,7 +76,7 @@ impl GraspLine {
         (self.end - self.start).norm()
     }
 
-    /// `count` keypoints evenly spaced from start to end, both included.
+    /// `count` keypoints, at least two, evenly spaced from start to end, both included.
     ///
     /// # Source
     /// OpenDR single_demo_grasp: the two clicked points and ten between them.
