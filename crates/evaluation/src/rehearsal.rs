@@ -259,8 +259,8 @@ impl Rehearsal<'_> {
         Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
     }
 
-    /// The lengths of a model that was taught from a shipped photo without a plan view. They follow from the camera that
-    /// took the photo: it looked vertically down, so the pixel size is uniform in the marks' plane.
+    /// The lengths of a model that was taught from a shipped photo without a plan view. They follow from the camera of
+    /// the photo: it looked vertically down, so the pixel size is uniform in the marks' plane.
     fn lengths_of_demonstration(&self) -> Result<Lengths> {
         let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
         let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;
