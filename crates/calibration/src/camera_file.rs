@@ -188,7 +188,7 @@ impl CalibratedCamera {
     /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept.
     ///
     /// # Errors
-    /// [`CameraFileError::NotUpdatable`] if the file does not have one field per line.
+    /// [`CameraFileError::NotUpdatable`] if the file does not have ROS's layout.
     pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
         let updated = merged(existing, &SECTIONS, &self.sections());
         match Self::from_yaml(&updated) {
@@ -287,7 +287,7 @@ fn check_model(file: &File) -> Result<(), CameraFileError> {
     }
 }
 
-/// Rejects a lens that shows one point at two pixels of the picture, or no point at a pixel. Checked at the border.
+/// Rejects a lens that shows two points or none at a pixel of the picture. Checked at the border.
 fn check_does_not_fold(camera: &PinholeCamera) -> Result<(), CameraFileError> {
     let [width, height] = [camera.width, camera.height].map(f64::from);
     let border = (0..=TRIED_A_SIDE).map(|step| f64::from(step) / f64::from(TRIED_A_SIDE)).flat_map(|share| {

@@ -27,7 +27,7 @@ pub enum CameraFileError {
     /// A coefficient is NaN or infinite.
     #[error("expected finite distortion_coefficients, found {found:?}")]
     Coefficients { found: Vec<f64> },
-    /// The distorted radius decreases again within the picture, so that two points of the world have the same pixel.
+    /// The lens shows two points of the world, or none, at a pixel of the picture.
     #[error(
         "expected distortion_coefficients that map every pixel to one point, found {found:?}, which fold the picture \
          at ({x:.0}, {y:.0}); calibrate again, with the board also in the corners of the picture"

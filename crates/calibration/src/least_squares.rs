@@ -1,9 +1,9 @@
 //! Least squares over shared parameters and six parameters of each picture (its pose).
 //!
 //! Legend: `s` the shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the
-//! gradients `g = Jᵀ r` of residuals `r` (computed minus measured). Pictures are coupled only by `s`, so their own steps
-//! are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`. The matrix on the left is also the information of the
-//! pictures about `s`; its inverse, times the variance of the residuals, is the covariance of `s`.
+//! gradients `g = Jᵀ r` of residuals `r` (computed minus measured). Pictures are coupled only by `s`, so their own
+//! steps are eliminated: `(A - Σ B C⁻¹ Bᵀ) δs = -(gₛ - Σ B C⁻¹ gₒ)`. The matrix on the left is also the information of
+//! the pictures about `s`; its inverse, times the variance of the residuals, is the covariance of `s`.
 //!
 //! # Source
 //! Levenberg–Marquardt with a scaled diagonal (Marquardt 1963); Schur complement as in bundle adjustment (Triggs et al.

@@ -39,7 +39,7 @@ pub fn board_pose(camera: &PinholeCamera, board: &Board, corners: &[SeenCorner])
 pub(crate) fn from_homography(homography: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let [x, y, t] = [0, 1, 2].map(|k| homography.column(k).into_owned());
     let scale = 2.0 / (x.norm() + y.norm());
-    // The sign is correct: `homography::fit` places the board's centre in front of the camera.
+    // The sign is correct: `homography::fit` places the corners' centre in front of the camera.
     let (x, y, t) = (x * scale, y * scale, t * scale);
     let matrix = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     let svd = matrix.svd(true, true);

@@ -83,7 +83,7 @@ pub(crate) fn motion(twist: &nalgebra::Vector6<f64>) -> nalgebra::Isometry3<f64>
     nalgebra::Isometry3::new(part(0), part(3))
 }
 
-/// The vector from the expected pixel to the found one.
+/// The residual: computed pixel (`found`) minus measured pixel (`expected`).
 pub(crate) fn off(found: &Point2<f64>, expected: &Point2<f64>) -> Vector2<f64> {
     found - expected
 }

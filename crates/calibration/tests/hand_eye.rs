@@ -73,8 +73,8 @@ pub fn views(mount: Mount, seed: u64, noise: &Noise) -> Vec<HandEyeView> {
     (0..NUM_POSES).map(|_| view(mount, &mut random, noise, 0.3)).collect()
 }
 
-/// The board completely visible, at 0.4 to 0.7 m, tilted by up to `max_tilt` (the tangent of half the angle) about each
-/// axis.
+/// The board completely visible, at 0.4 to 0.7 m, tilted by up to `max_tilt` (the tangent of half the angle) about the
+/// picture's x and y.
 fn view(mount: Mount, random: &mut Random, noise: &Noise, max_tilt: f64) -> HandEyeView {
     let (board, x, y) = (board(), truth(mount), board_truth(mount));
     loop {

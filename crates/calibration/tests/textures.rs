@@ -1,4 +1,4 @@
-//! Pictures without a board, from seeds: wood, cloth, tiles, gravel.
+//! Pictures without a board, from seeds: wood, cloth, tiles, gravel, grains.
 
 use crate::rendering::Random;
 use image::{GrayImage, Luma};

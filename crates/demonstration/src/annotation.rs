@@ -14,7 +14,7 @@ pub struct Annotation {
     /// The two points of the grasp, if marked.
     pub grasp: Option<GraspLine>,
     /// Opening of the jaws where they close on the part, in pixels, if marked; otherwise it is measured from the
-    /// outline.
+    /// outline or the box.
     pub jaw_width: Option<f64>,
     /// The outline, if drawn.
     pub outline: Option<Polygon>,
@@ -157,7 +157,7 @@ mod tests {
         };
         refused(marked(BOX, [30.0, 30.0, 60.0, 60.0], None), "a grasp line that crosses the box");
         refused(marked(BOX, [100.5, 160.0, 219.0, 80.0], None), "the box of the two grasp points");
-        // COCO's width and height given as the lower right corner.
+        // The lower right corner was given in place of COCO's width and height.
         refused(marked([100.0, 80.0, 400.0, 280.0], [180.0, 150.0, 220.0, 140.0], Some(BOX)), "x, y, width, height");
     }
 }

@@ -8,8 +8,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// The reason why a photo, an annotation or an augmentation was refused.
 ///
-/// `place` fields give the position in the file: `line 3, column 7` for text that is not JSON, a
-/// path such as `shapes[2].points[0]` for JSON of the wrong content.
+/// `place` fields give the position in the file: `line 3, column 7` for invalid JSON, a path such as
+/// `shapes[2].points[0]` for JSON with the wrong content, `line 3` for YOLO's text.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]

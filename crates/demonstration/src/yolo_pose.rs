@@ -269,7 +269,7 @@ mod tests {
         let oriented = "0 0.404687 0.35 0.60625 0.35 0.60625 0.579167 0.404687 0.579167";
         refused(oriented, None);
         refused("0 0.596094 0.575 0.460156 0.458333 0.919531 0.360417 0.489063 0.421875", None);
-        // With any numbers.
+        // Also if the numbers can be those of a box and two keypoints.
         refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", None);
         refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", Some(b"names: [rod]\n"));
         let announced = Some(&b"kpt_shape: [2, 2]\nnames: [rod]\n"[..]);

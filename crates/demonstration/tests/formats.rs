@@ -98,7 +98,7 @@ fn what_one_format_holds_comes_back_from_every_other() {
 
 #[test]
 fn damaged_files_end_in_an_error_or_in_what_can_be_marked() {
-    // Every byte of every file, truncated there and replaced by other bytes: no panic, and never a position outside the
+    // Four files, truncated at each byte, and with each byte replaced by others: no panic, and never a box outside the
     // image.
     let files: [(&[u8], Option<&[u8]>); 4] = [
         (YOLO_POSE, None),

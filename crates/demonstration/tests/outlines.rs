@@ -134,7 +134,7 @@ fn hard_shadows_are_left_out() {
     }
 }
 
-/// Minimum fraction of a shadow, beside the part, for an outline that includes it.
+/// An outline includes a shadow and the part if it contains at least these fractions of them.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
 /// A shadow is removed if the outline includes a fraction of it that is larger by at most this than in the outline

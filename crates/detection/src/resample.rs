@@ -89,7 +89,7 @@ pub fn antialiased_bytes(image: &RgbImage, width: usize, height: usize) -> Vec<u
 pub fn bilinear(image: &RgbImage, width: usize, height: usize) -> Vec<f32> {
     let (in_width, in_height) = (image.width() as usize, image.height() as usize);
     let taps = |input: usize, output: usize| -> Vec<(usize, usize, f32)> {
-        // Single precision, as in torch: at pixel 600 the weights differ in the fifth digit.
+        // Single precision, as in torch: at pixel 600 the weights differ from exact ones in the fifth digit.
         let scale = input as f32 / output as f32;
         (0..output)
             .map(|i| {

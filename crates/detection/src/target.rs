@@ -55,7 +55,7 @@ impl From<Mask> for ObjectMask {
 }
 
 impl ObjectMask {
-    /// The mask on the resized image; each pixel takes the value of one pixel of the original.
+    /// The mask on the resized image; each pixel of a bitmap takes the value of one pixel of the original.
     fn resized(&self, image: &TransformedImage, kind: MaskTargets) -> Self {
         let [scale_x, scale_y] = image.resized_from_original();
         let mask = match self {

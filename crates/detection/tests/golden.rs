@@ -104,7 +104,7 @@ fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageDifference) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
     assert!(!report.stages.is_empty() && report.stages.iter().all(|s| s.passed || excused(s)), "{report}");
-    // Every tensor was compared: all except the targets, and keypoints twice.
+    // Every tensor of the reference except the targets was compared; keypoints have two stages.
     let reference = read(&folder.join("expected.safetensors"));
     for name in reference.keys().filter(|name| !name.starts_with("targets.")) {
         assert!(report.stages.iter().any(|stage| stage.name.starts_with(name)), "{name} was passed over");

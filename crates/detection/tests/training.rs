@@ -128,7 +128,8 @@ fn a_bitmap_teaches_as_its_polygon_does() {
     let bitmap = loss(polygon.rasterize(256, 192).into());
     let empty = loss(Mask::empty(256, 192).into());
     let polygon = loss(polygon.into());
-    // An initial network is undecided, with ln 2 per cell, so the difference is the sum over the cells that differ.
+    // An untrained network's loss is nearly ln 2 per cell for every mask; only cells in which the masks differ make a
+    // difference.
     assert!((bitmap - polygon).abs() < 0.1 * (empty - polygon).abs(), "{bitmap} {polygon} {empty}");
 }
 

@@ -9,11 +9,11 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose height
-/// a photo does not show.
+/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose
+/// height a photo does not show.
 ///
 /// # Errors
-/// The ray does not meet that height, or the part is wider than the hand opens.
+/// The ray through the grasp does not meet that surface, or the part is wider than the hand opens.
 pub fn grasp_pose(object: &ObjectSpec, camera: &PosedCamera, grasp: &PlanarGrasp) -> Result<GraspPose, GraspError> {
     let plane = GraspPlane { mark_height_m: object.seen_height_m, grasp_height_m: object.grasp_height_m };
     GraspPose::from_planar(camera, grasp, &plane, LARGEST_JAW_WIDTH_M)

@@ -19,8 +19,7 @@ use crate::statistics::{Share, wilson_interval};
 const FIRST: u64 = 1 << 40;
 /// Number of samples, three quarters of which contain the part. Chosen to save time: a sample takes 0.15 s on one core.
 const COUNT: u64 = 24;
-/// Maximum size of a sample, in pixels. Larger samples take longer without more information: the part has a few hundred
-/// pixels in any case.
+/// Maximum size of a sample, in pixels: that of the paper's pictures. Larger samples take longer.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
 /// Range of the part's size in the samples, relative to the photo, for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;

@@ -192,7 +192,7 @@ impl Rehearsal<'_> {
     /// A grasp that cannot be executed (wider than the hand, off the table) is a failed attempt.
     ///
     /// # Errors
-    /// Errors of the simulation.
+    /// The simulation fails, or the model's lengths or the place are invalid.
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let mut variation = VariationConfig::default();
@@ -259,8 +259,8 @@ impl Rehearsal<'_> {
         Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
     }
 
-    /// The lengths of a model that was taught from a shipped photo without a plan view, from the camera that took the
-    /// photo. That camera looked straight down, so the pixel size is uniform in the marks' plane.
+    /// The lengths of a model that was taught from a shipped photo without a plan view. They follow from the camera of
+    /// the photo: it looked vertically down, so the pixel size is uniform in the marks' plane.
     fn lengths_of_demonstration(&self) -> Result<Lengths> {
         let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
         let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;

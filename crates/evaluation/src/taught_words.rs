@@ -4,7 +4,7 @@ use sdg_demonstration::Demonstration;
 use sdg_grasp::{Ending, GraspModel, Taught};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 
-/// A warning if the jaws would have to open farther than the hand can: no detection could then be grasped.
+/// A warning if the jaws of a demonstration are wider than the hand opens: the detected part could not be grasped.
 pub fn too_wide(model: &GraspModel) -> Option<String> {
     let pixels_per_m = model.facts().lengths?.pixels_per_m;
     let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);

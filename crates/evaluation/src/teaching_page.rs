@@ -179,7 +179,7 @@ fn jaw_width_px(model: &GraspModel, at: usize) -> f64 {
     model.demonstrations().get(at).map_or(0.0, |TaughtDemonstration { marks, .. }| marks.width_px)
 }
 
-/// The first training samples and their marks.
+/// Small augmented samples and their marks.
 fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
     let config = AugmentationConfig::default().with_output_size(320, 240);
     let augmenter = Augmenter::new(demonstrations, config, seed)?;

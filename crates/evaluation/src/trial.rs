@@ -27,7 +27,7 @@ pub struct Trial {
     pub best_agreement: Option<f64>,
     /// The network's score of the best detection; zero if there is none.
     pub network_score: f64,
-    /// Error of the accepted detection, if the part is in the picture and was found.
+    /// Error of the best detection, if it was accepted and the part is in the picture.
     pub error: Option<DetectionError>,
     /// Error of the best detection, even if it was refused.
     pub best_error: Option<DetectionError>,

@@ -23,7 +23,7 @@ pub struct Keypoint {
     pub x: f64,
     /// Pixels down.
     pub y: f64,
-    /// Whether the position is valid.
+    /// Whether the point is labelled and visible.
     pub visibility: Visibility,
 }
 
@@ -76,7 +76,7 @@ impl GraspLine {
         (self.end - self.start).norm()
     }
 
-    /// `count` keypoints evenly spaced from start to end, both included.
+    /// `count` keypoints, at least two, evenly spaced from start to end, both included.
     ///
     /// # Source
     /// OpenDR single_demo_grasp: the two clicked points and ten between them.

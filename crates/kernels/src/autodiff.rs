@@ -263,8 +263,8 @@ macro_rules! consumed {
 ///
 /// burn itself adds a second gradient to the first, but reads both in the order of their shape, which is the slowest
 /// for channels-last maps: a tenth of a training step of the `edge` preset. This is a macro because a node's type has
-/// no name outside burn. The gradient of a leaf, which is read after the pass, cannot be taken out; its requirement
-/// differs from that of an operation's node.
+/// no name outside burn. The gradient of a leaf is read after the pass and cannot be taken out: a leaf has another
+/// `requirement` than the node of an operation.
 macro_rules! given_before {
     ($grads:ident, $ops_node:expr, $parent:expr) => {{
         let first = GIVEN.with_borrow_mut(|given| given.insert($parent.id.value));

@@ -29,8 +29,7 @@ pub const MIN_CORNERS: usize = 9;
 /// Pictures are halved as long as their longer side stays at least this: corners of a blurred picture are only found at
 /// low resolution.
 const MIN_SIDE: u32 = 160;
-/// Larger pictures are halved before the first search: at lower resolution, smoothing does not hide the sharp corners
-/// of large squares.
+/// Pictures with a longer side above this are halved before the first search.
 const MAX_SIDE: u32 = 2000;
 
 /// Finds the board, which may be partly outside the picture.

@@ -49,7 +49,7 @@ pub struct Calibration {
     pub rms_px: f64,
     /// The result for each picture, in the given order.
     pub pictures: Vec<PictureFit>,
-    /// Deficiencies of the pictures, most useful first.
+    /// Deficiencies of the pictures, the most useful to correct first.
     pub advice: Vec<Advice>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! corners ─┬─ intrinsics known: the pose with the smallest reprojection error, and its uncertainty   sheet_pose.rs
-//!          └─ unknown: homography; the focal length if the tilt determines it, else a guess   focal.rs, guessed.rs
+//!          └─ unknown: homography; the focal length if the tilt determines it, else a guess   focal.rs, ../guessed.rs
 //! ```
 //! A homography alone gives positions on the table. Positions above the table depend on the focal length; [`FocalCost`]
 //! states how much.

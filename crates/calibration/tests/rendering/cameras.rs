@@ -55,8 +55,8 @@ pub fn board() -> Board {
     Board::new(9, 6, 0.025).expect("a board")
 }
 
-/// The board's pose in each picture: at positions all over the picture, tilted in every direction by up to 40 degrees,
-/// completely visible.
+/// The board's pose in each picture: completely visible, at positions all over the picture, tilted by up to 40 degrees
+/// about the picture's x and y.
 pub fn poses(camera: &PinholeCamera) -> Vec<Isometry3<f64>> {
     let board = board();
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));

@@ -142,8 +142,8 @@ pub fn render_with(
     })
 }
 
-/// The mean over a pixel, from its corners and their brightness; from 16 × 16 samples if the corners' brightness
-/// differs.
+/// The mean over a pixel: the brightness of its corners and its centre or, if these differ, the mean of 16 × 16
+/// samples.
 fn mean_over(corners: [(Point2<f64>, f64); 4], brightness: &dyn Fn(&Point2<f64>) -> f64) -> f64 {
     const SIDE: usize = 16;
     let [a, b, c, d] = corners.map(|(place, _)| place);

@@ -71,8 +71,8 @@ impl Augmenter {
     }
 
     /// Only windows of the frame, just large enough for the part at any angle and size, so that most of a network's
-    /// computation concerns the part. Scale, tables, distractors and light are those of whole frames. Sides are
-    /// multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
+    /// computation concerns the part. Scale, tables and light are those of whole frames; distractors are fewer. Sides
+    /// are multiples of `multiple` pixels, or the frame's sides if those are smaller; the paper's samples stay whole.
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {

@@ -205,7 +205,7 @@ impl Figure {
         Self { solids: vec![arc], holes: vec![], rim: half_width * uniform(rng, 0.3, 0.98) }
     }
 
-    /// An irregular shape: merged discs.
+    /// An irregular shape: merged capsules.
     pub fn blob(rng: &mut SampleRng) -> Self {
         let solids = (0..3 + index_below(rng, 3))
             .map(|_| {

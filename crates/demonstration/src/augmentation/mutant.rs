@@ -5,7 +5,8 @@ use sdg_geometry::Polygon;
 
 use super::random::{SampleRng, chance, index_below, log_uniform, uniform};
 
-/// A mutant counts as the part itself if the overlap (IoU) of their silhouettes exceeds this at any angle and size.
+/// A mutant counts as the part itself if the overlap (IoU) of their silhouettes, at similar size, reaches this at any
+/// angle.
 const TOO_ALIKE_IOU: f64 = 0.8;
 /// Maximum number of mutants per demonstration.
 const BANK_SIZE: usize = 24;

@@ -86,7 +86,7 @@ impl Prepared {
         );
         let radius = region.vertices.iter().map(|v| (v - center).norm()).fold(1.0, f64::max);
 
-        // Outlines are drawn inside as often as outside, and the part casts a shadow.
+        // With a margin, because a drawn outline may lie inside the true one, and because the part casts a shadow.
         let margin = (0.06 * radius * prepared_from_photo).clamp(2.0, 12.0) as f32;
         let hole: Vec<bool> = distance.iter().map(|&d| d > -margin).collect();
         let background = fill(&photo, &hole);

@@ -20,8 +20,8 @@ pub struct Sample {
 /// One part on a [`Sample`], in pixels of the sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleObject {
-    /// The box, clipped at the image's border: tight around the outline or, without one and in the paper's style,
-    /// around the rotated box.
+    /// The box, clipped at the image's border: tight around the outline; without an outline, or in the paper's style,
+    /// tight around the rotated box.
     pub bbox: BoundingBox,
     /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled outside
     /// the image, occluded where something covers them. Empty if no grasp is marked.

@@ -1,7 +1,7 @@
 //! Similarity warps of 8-bit pictures in fixed point: fast enough for a picture of full resolution in every sample.
 //!
 //! A pixel is one 64-bit word of four 16-bit lanes (red, green, blue, nothing), so that bilinear interpolation of all
-//! channels is four loads and three multiplications of plain integers. Positions along a row differ by a constant
+//! channels is four loads and four multiplications of plain integers. Positions along a row differ by a constant
 //! step, and a run of columns that lies inside the picture is read by a loop without conditions.
 //!
 //! ```text

@@ -169,7 +169,7 @@ mod tests {
         let outline = propose_outline(&image, &bbox);
         for vertex in &outline.vertices {
             let radius = (vertex - Point2::new(800.0, 800.0)).norm();
-            // A pixel of the reduced picture covers about seven of the photo.
+            // A pixel of the reduced picture is about seven pixels of the photo wide.
             assert!((radius - 600.0).abs() < 10.0, "{vertex}: {radius}");
         }
     }

@@ -276,7 +276,7 @@ mod tests {
         for (at, pinned) in pinned.iter().enumerate() {
             assert_eq!(*pinned, (at % width >= 20).then_some(false), "{at}");
         }
-        // If it is already on the right side, it selects only its own surroundings.
+        // A click on a pixel that is already on the right side selects only this pixel.
         let mut pinned = vec![None; colors.len()];
         pin_all(click(5, 10, true), &mut pinned);
         assert_eq!(pinned.iter().filter(|pinned| pinned.is_some()).count(), 1);
@@ -291,7 +291,7 @@ mod tests {
         });
         let bbox = BoundingBox { x1: 45.0, y1: 45.0, x2: 155.0, y2: 155.0 };
         let frame = Frame::cut_out(&image, &bbox, 1e9).unwrap();
-        // In pixels of the frame; slivers are missing left and right.
+        // The frame's first pixel is at (23, 23). The start lacks slivers at the left and the right of the disc.
         let [left, top] = [45.0 - 22.0, 45.0 - 22.0];
         let without_slivers = |at: usize| {
             let (x, y) = (left + (at % frame.width) as f64, top + (at / frame.width) as f64);

@@ -1,7 +1,7 @@
-//! Photos of parts with a shadow that a proposed outline includes, made from photos with a known outline.
+//! Photos of parts with a shadow that a proposed outline may include, made from photos with a known outline.
 //!
-//! The shadow is the outline moved away from the lamp, blurred, and bluer than the light, because other lamps and the
-//! sky light it.
+//! The shadow is the area that the outline sweeps when it moves away from the lamp, blurred. It can be bluer than the
+//! light, because other lamps and the sky light it.
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};

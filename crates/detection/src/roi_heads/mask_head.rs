@@ -44,7 +44,7 @@ pub struct MaskHead {
 impl MaskHead {
     /// Initialises the parameters at random, for a pyramid of `channels` channels.
     ///
-    /// If the background comes first, it also has a map, which is not used: torchvision.
+    /// If the background comes first (torchvision), it also has a map, which is not used.
     pub fn init(
         config: &MaskHeadConfig,
         channels: usize,

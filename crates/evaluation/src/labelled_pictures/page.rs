@@ -26,7 +26,7 @@ const TAG_WIDTHS: f64 = 3.4;
 /// Makes the page. Pictures are read again from their files.
 ///
 /// # Errors
-/// A picture is no longer there.
+/// A picture cannot be read.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
@@ -82,7 +82,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     Ok(report.section(this_run(evaluated, command)).footer(FOOTER))
 }
 
-/// The number of all errors, and of those that would cause a wrong grasp; the worst picture has the most.
+/// The number of all errors, and of wrong detections in pictures with the part; the worst picture has the most.
 fn num_errors(judged: &Judged) -> (usize, usize) {
     let all = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
     (all, judged.wrong())

@@ -34,7 +34,7 @@ impl Evaluated<'_> {
     }
 }
 
-/// All results as one object; the units are pixels, percent of the diagonal, and degrees.
+/// All results as one object; the names of fields end with the units `px`, `mm`, `percent` (of the diagonal), `deg`.
 pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);

@@ -50,8 +50,8 @@ pub struct TrueGrasp {
 }
 
 impl Truth {
-    /// The ground truth of an instance. If the labels do not state size and symmetry, the size follows from the length
-    /// of the instance's marks (relative to the mean over several demonstrations), and the symmetry is the model's.
+    /// The ground truth of an instance. If the labels do not state size and symmetry, the diagonal is the length of the
+    /// instance's marks times the demonstrations' mean ratio of both, and the symmetry is the model's.
     pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
@@ -101,7 +101,7 @@ impl Tested {
     /// Reads a picture and runs the model on it.
     ///
     /// # Errors
-    /// The picture cannot be read, or detection fails.
+    /// The picture cannot be read or is stored rotated, or detection fails.
     pub fn detect(mut picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
         if detector.pixel_frame() == PixelFrame::Sensor {
             sdg_inputs::check_is_not_turned(&picture.path)?;
@@ -445,8 +445,7 @@ mod tests {
 
     #[test]
     fn one_detection_to_one_instance_from_the_best_score_on() {
-        // Both detections hit both instances. The better one takes the nearer instance, and the other one the remaining
-        // instance.
+        // Each detection hits both instances. The first takes the nearer instance, the second the remaining one.
         let found = judged(
             vec![truth(100.0, 0.0, false), truth(103.0, 0.0, false)],
             vec![detection(102.0, 0.0, 0.9), detection(102.5, 0.0, 0.8), detection(102.0, 0.0, 0.7)],

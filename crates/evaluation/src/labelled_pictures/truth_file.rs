@@ -117,7 +117,7 @@ impl RawInstance {
         // The points were rounded. Only their distance is used; centre and direction have their own fields.
         let (sin, cos) = Angle::from_degrees(self.angle_deg).radians().sin_cos();
         let (center, half) = (Point2::from(self.centre_px), half_length * Vector2::new(cos, sin));
-        // The file has no box. A square with the same diagonal is used; it is only drawn.
+        // The file has no box; a square with the same diagonal replaces it.
         let side = self.diag_px * std::f64::consts::FRAC_1_SQRT_2;
         let [left, top] = self.centre_px.map(|middle| middle - 0.5 * side);
         Ok(Instance {

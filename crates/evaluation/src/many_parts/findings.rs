@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::cross_check::{CrossCheck, LookAlikePair};
 use super::part_store::PartOutcome;
 
-/// Minimum fraction of held-out parts that are found; below it, a part needs another photo.
+/// Minimum fraction of held-out samples with the part in which it is found; below it, a part needs another photo.
 const MIN_FOUND: f64 = 0.75;
 
 /// The results of all requested parts.

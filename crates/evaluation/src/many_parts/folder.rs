@@ -39,8 +39,8 @@ impl DemonstrationFolder {
     /// Reads a folder. Each photo with marks beside it is a part; each subfolder with such photos is a part as well.
     ///
     /// # Errors
-    /// The folder cannot be read or has no photo with marks; two parts have the same name; a symmetry is given for an
-    /// unknown part.
+    /// The folder cannot be read or has no photo with marks; two parts have the same name; a symmetry is invalid or
+    /// given for an unknown part.
     pub fn read(folder: &Path, symmetry: impl Fn(&str) -> Result<RotationalSymmetry, String>) -> Result<Self> {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
         let mut left_out = Vec::new();

@@ -1,4 +1,4 @@
-//! Stores the results of each part: the model file, and a record of the inputs of teaching.
+//! Stores the results of each part: the model file, and a record of the inputs and the outcome of teaching.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::held_back::HeldBackFigures;
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 
-/// The folder of the models.
+/// The folder of the models and records.
 #[derive(Debug, Clone)]
 pub struct PartStore(PathBuf);
 

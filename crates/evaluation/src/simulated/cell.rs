@@ -100,7 +100,7 @@ impl std::fmt::Display for Cell<'_> {
 pub enum Marks {
     /// The marks of the shipped demonstration.
     Shipped,
-    /// The marks of the shipped demonstration, each moved by `MARKS_JITTER_PX`.
+    /// The marks of the shipped demonstration, moved by `MARKS_JITTER_PX`.
     Jittered,
     /// The marks of the shipped demonstration, in the plan view of the camera that took it.
     InPlanView,

@@ -78,7 +78,7 @@ impl AttemptRecord {
         }
     }
 
-    /// The record of an attempt that failed before the robot moved.
+    /// The record of a failed attempt without a report: teaching or the simulation failed.
     pub fn failed(attempt: usize, step: &str, why: String) -> Self {
         Self {
             attempt,

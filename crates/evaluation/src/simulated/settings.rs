@@ -4,8 +4,8 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The settings that determine the results of the paper's protocol, besides models and parts. They are stored in every
-/// file of a [`Store`](super::Store), so that no table combines results of different settings.
+/// The settings that determine the results of the paper's protocol, besides models and parts. Each record of a
+/// [`Store`](super::Store) contains those on which it depends, so that no table combines results of different settings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {

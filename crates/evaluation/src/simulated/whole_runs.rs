@@ -1,5 +1,5 @@
-//! A small evaluation, and a few axes and errors, in the simulator with one part and model S, which is taught in a
-//! moment.
+//! Small evaluations in the simulator (protocol, axes and errors, cameras), each with one part and model S, which is
+//! taught in a moment.
 
 use std::fs;
 use std::path::Path;

@@ -45,7 +45,7 @@ struct Candidate<'a> {
     image: String,
     kind: &'a str,
     place: Place,
-    /// The hit, matched one to one in order of decreasing score; null for a second candidate on the same instance.
+    /// The hit, matched one to one in order of decreasing score; null also for a second candidate on the same instance.
     hit: Option<Hit>,
     /// Distance from the nearest instance, in percent of its diagonal; null in pictures without an instance.
     distance_percent: Option<f64>,

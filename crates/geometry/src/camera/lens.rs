@@ -63,7 +63,7 @@ impl PlumbBob {
                 return self.grows_up_to(found.coords.norm_squared()).then_some(found);
             }
             let step = self.jacobian(&found).try_inverse()? * off;
-            // At most 1: a longer step may lead beyond the radius at which the polynomial decreases again.
+            // A step longer than 1 may lead beyond the radius at which the polynomial decreases again.
             found += step * (1.0 / step.norm()).min(1.0);
         }
         None

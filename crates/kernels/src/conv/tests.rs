@@ -210,7 +210,7 @@ fn packed_weights_are_forgotten_with_the_weights() {
     let device = Device::flex();
     let x = tensor([1, 16, 6, 6], 1, &device);
     let params = Conv2dParams::square(1, 1);
-    // The same network twice, then changed in place, and as a new tensor at possibly the same address.
+    // The same weights twice, then doubled (possibly in place), and then new ones, possibly at the same address.
     for seed in 2..6 {
         let mut weight: Tensor<4> = tensor([16, 16, 3, 3], seed, &device);
         let first = to_vec(conv2d(x.clone(), weight.clone(), None, params));

@@ -23,7 +23,7 @@ const ROIS: [f32; 50] = [
     1.0, 15.0, 8.0, 40.0, 30.0,
     0.0, -9.0, -7.0, 6.0, 5.0,
     0.0, -10.0, -10.0, 50.0, 50.0,
-    // Wholly outside; without area; upside down; long and thin; the last pixel.
+    // Completely outside; without area; with exchanged corners; long and thin; the last pixel.
     1.0, 100.0, 100.0, 120.0, 110.0,
     0.0, 6.0, 6.0, 6.0, 6.0,
     1.0, 12.0, 9.0, 5.0, 3.0,

@@ -13,7 +13,7 @@ use crate::prefetch::BatchRequest;
 pub struct SampleSource<'a> {
     /// Whole frames, as in detection.
     pub frames: &'a (dyn Fn(u64) -> Sample + Sync),
-    /// Windows of frames at the same scale, each with most of the part; see [`crate::WindowPhase`].
+    /// Windows of frames at the same scale, with most of the part if the scene has it; see [`crate::WindowPhase`].
     pub windows: &'a (dyn Fn(u64) -> Sample + Sync),
 }
 

@@ -145,7 +145,7 @@ mod tests {
         assert_eq!((validation.positives, validation.hits), (3, 1));
         assert_eq!((validation.negatives, validation.false_alarms), (2, 1));
         assert_eq!(validation.median_error_px, 2.0);
-        // Without a hit there is nothing to compare with.
+        // Without a hit, scores are compared with `NO_HIT_SCORE`.
         let nothing_hit = Validation::from_outcomes(&[Outcome::Absent { score: 0.6 }, Outcome::Absent { score: 0.4 }]);
         assert_eq!(nothing_hit.false_alarms, 1);
     }

@@ -43,7 +43,7 @@ fn image_from_turned(turn: Angle) -> Rotation2<f64> {
     Rotation2::new(turn.radians())
 }
 
-/// The part's tight box in the image rotated back by `turn`; `None` if it has no extent.
+/// The part's tight box in the image rotated back by `turn`; `None` if the image does not show its outline.
 fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> Option<BoundingBox> {
     let Some(outline) = object.outline.as_ref().filter(|_| turn != Angle::ZERO) else {
         return Some(object.bbox);

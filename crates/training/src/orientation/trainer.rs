@@ -98,7 +98,7 @@ pub fn teach(
 /// Trains `network`, whose device carries autodiff, on the crops that `scene` returns for each scene index.
 ///
 /// # Errors
-/// The errors of [`teach`], and a crop whose size differs from the network's input.
+/// An invalid setting, a loss that is not finite, or a crop whose size differs from the network's input.
 pub fn train(
     network: OrientationCnn,
     training: &OrientationTraining,

@@ -18,7 +18,8 @@ pub struct PlacedDetection {
     pub error_mm: Option<f64>,
     /// Angle error, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// The instance that the detection found: within 10 mm and 10° (slants: 3 mm and 3°), and not found by a better detection.
+    /// The instance that the detection found: within 10 mm and 10° (slants: 3 mm and 3°), and not found by a better
+    /// detection.
     pub found: Option<usize>,
 }
 

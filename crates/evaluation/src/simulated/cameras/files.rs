@@ -1,4 +1,4 @@
-//! Writes the results of the cameras to files in the evaluation's folder, and prints them in a few lines.
+//! Writes the results of the cameras to files in the evaluation's folder, and summarises them in a few lines.
 
 use std::path::{Path, PathBuf};
 

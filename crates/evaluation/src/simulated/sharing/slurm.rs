@@ -1,7 +1,7 @@
-//! A script that submits an evaluation's units to Slurm: three consecutive job arrays.
+//! A script that submits an evaluation's units to Slurm: job arrays in three consecutive stages.
 //!
 //! Teaching runs are first; pictures and grasps start when these have ended; speed is measured at the end, each
-//! unit alone on a node. An array waits for the end of the previous one, not for its success: failed teaching does
+//! unit alone on a node. An array waits for the end of the previous stage, not for its success: failed teaching does
 //! not block the units of other parts, and the units of the same part report that the model is missing.
 
 use std::fmt::Write;

@@ -11,7 +11,7 @@ use super::unit_folder::UnitFolder;
 use super::unit_list::{SavedUnit, UnitKind, UnitList};
 use super::worker::{Worker, unix_secs};
 
-/// Number of failures after which a unit is not tried again, since Slurm requeues a job once.
+/// Number of failures after which a unit is not tried again: unit_job.sh requeues a failed unit once.
 const MAX_TRIES: usize = 2;
 /// Maximum number of running units, and of failed units, in the list.
 const MAX_LISTED: usize = 12;
