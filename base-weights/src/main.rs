@@ -1,4 +1,5 @@
 //! `sdg-base-weights`: pretrains preset `edge`, exports the weights from which teaching starts, and compares weights.
+#![forbid(unsafe_code)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -15,7 +15,7 @@ tools=$(rustc --print sysroot)/lib/rustlib/$host/bin
 out=target/hardening/coverage
 mkdir -p "$out/figures"
 # Programs of the build also write counts.
-LLVM_PROFILE_FILE="$PWD/$out/build-%p.profraw" RUSTC_WORKSPACE_WRAPPER="$PWD/scripts/hardening/instrumented_rustc.sh" \
+LLVM_PROFILE_FILE="$PWD/$out/build-%p.profraw" RUSTC_WORKSPACE_WRAPPER="$PWD/scripts/hardening/instrument.sh" \
     scripts/build.sh --bin hardening
 cp target/release/hardening "$out/hardening"
 # Restores the program without counters.

@@ -52,7 +52,7 @@ pub enum Error {
         "{}: expected a token of at least 16 letters or digits, found {found} characters (delete the file to renew it)",
         path.display()
     )]
-    NotAKey {
+    NotAToken {
         path: PathBuf,
         /// Number of characters in it.
         found: usize,

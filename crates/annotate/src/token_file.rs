@@ -21,14 +21,14 @@ pub fn token_of_file(path: &Path) -> Result<String> {
         let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
         written.map_err(|source| Error::File {
             path: path.to_owned(),
-            action: "cannot write the key to the page",
+            action: "cannot write the token of the page",
             source,
         })?;
         return Ok(token);
     }
     let text = String::from_utf8_lossy(&sdg_files::read(path, MAX_BYTES)?).trim().to_owned();
     if text.len() < 16 || !text.chars().all(|c| c.is_ascii_alphanumeric()) {
-        return Err(Error::NotAKey { path: path.to_owned(), found: text.chars().count() });
+        return Err(Error::NotAToken { path: path.to_owned(), found: text.chars().count() });
     }
     Ok(text)
 }

@@ -234,7 +234,11 @@ impl Workcell {
     /// Describes which bodies of the arm touch which objects.
     pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
-        let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());
+        // The table is a geom of MuJoCo's body "world".
+        let name_of = |body: Id<Body>| match model.name(body) {
+            Some(name) if name != "world" => name,
+            _ => "the table".into(),
+        };
         let mut touching: Vec<String> = self
             .data
             .contacts()
