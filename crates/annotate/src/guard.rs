@@ -45,9 +45,10 @@ impl Refusal {
         match self {
             Self::Host => Response::plain(403, "this server answers to 127.0.0.1 and localhost only\n"),
             Self::Origin => Response::plain(403, "this server answers its own page only\n"),
-            Self::Token => {
-                Response::plain(401, "open the address that `sdg annotate` printed: it contains the token of this page\n")
-            }
+            Self::Token => Response::plain(
+                401,
+                "open the address that `sdg annotate` printed: it contains the token of this page\n",
+            ),
         }
     }
 }
