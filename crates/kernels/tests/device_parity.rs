@@ -76,17 +76,21 @@ fn assert_agrees<const N: usize>(
 
 #[test]
 fn convolutions_agree() {
-    for (kernel, params) in [
-        (3, Conv2dParams::square(1, 1)),
-        (3, Conv2dParams::square(2, 1)),
-        (1, Conv2dParams::UNIT),
-        (7, Conv2dParams::square(2, 3)),
+    for (kernel, params, [channels_in, channels_out]) in [
+        (3, Conv2dParams::square(1, 1), [24, 20]),
+        // With multiples of sixteen, flex uses Winograd's transforms.
+        (3, Conv2dParams::square(1, 1), [32, 16]),
+        (3, Conv2dParams::square(2, 1), [24, 20]),
+        (1, Conv2dParams::UNIT, [24, 20]),
+        (7, Conv2dParams::square(2, 3), [24, 20]),
     ] {
         let [height, width] = output_size(params, kernel);
-        let inputs = [[2, 24, 13, 17], [20, 24, kernel, kernel], [2, 20, height, width]];
+        let inputs =
+            [[2, channels_in, 13, 17], [channels_out, channels_in, kernel, kernel], [2, channels_out, height, width]];
         for activation in [Activation::Identity, Activation::Relu] {
-            assert_agrees(&format!("conv2d {kernel}×{kernel} {params:?}"), inputs, |[x, weight, residual], device| {
-                let (bias, scale) = (random([20], 7, device), random([20], 8, device));
+            let name = format!("conv2d {kernel}×{kernel} {channels_in} to {channels_out} {params:?}");
+            assert_agrees(&name, inputs, |[x, weight, residual], device| {
+                let (bias, scale) = (random([channels_out], 7, device), random([channels_out], 8, device));
                 let epilogue = Conv2dEpilogue { scale: Some(scale), residual: Some(residual), activation };
                 conv2d_fused(x, weight, Some(bias), params, epilogue)
             });
