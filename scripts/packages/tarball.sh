@@ -12,6 +12,9 @@ out=target/packages/tarball
 name=single-demo-grasp-$version-$machine-linux
 rm -rf "${out:?}/$name"
 scripts/packages/lay_out.sh "$out/$name"
+install -d "$out/$name/lib"
+mv "$out/$name/bin/sdg" "$out/$name/lib/sdg"
+install -m 755 scripts/packages/start.sh "$out/$name/bin/sdg"
 tarball=$out/$name.tar.xz
 tar --create --xz --file "$tarball.new" --directory "$out" --sort=name --owner=0 --group=0 --numeric-owner \
     --mtime "@$(git log -1 --format=%ct)" "$name"

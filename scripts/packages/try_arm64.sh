@@ -18,10 +18,12 @@ case $package in
     *.deb)
         dpkg --root="$root" --force-architecture --force-depends --install "$package" >/dev/null 2>&1
         installed=$root/usr
+        program_file=$installed/bin/sdg
         ;;
     *)
         tar --extract --xz --file "$package" --directory "$root/opt"
         installed=$(echo "$root"/opt/*/)
+        program_file=$installed/lib/sdg
         ;;
 esac
 # A home folder that does not exist, and a folder with a space and an umlaut.
@@ -31,7 +33,7 @@ chmod 755 "$root"
 chown nobody "$folder"
 cat >"$root/sdg" <<END
 #!/bin/sh
-exec qemu-aarch64-static -L "$root" "$installed/bin/sdg" "\$@"
+exec qemu-aarch64-static -L "$root" "$program_file" "\$@"
 END
 chmod 755 "$root/sdg"
 as_nobody() { unshare --net setpriv --reuid nobody --regid nogroup --clear-groups env HOME=/nonexistent "$@"; }

@@ -14,18 +14,19 @@ pub const DEFAULT_MIN_SCORE: f64 = 0.5;
 /// Draws all detections on a copy of the image.
 pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {
     let mut drawn = image.clone();
-    draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[]);
+    draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[], Vec::new());
     drawn
 }
 
 /// Draws detections, which are ordered by decreasing score. Those with at least `min_score` are drawn as accepted. If
 /// any reasons are given, every refused detection gets a box, and one with a reason also its outline and a tag with
-/// score and reason. Tags with reasons do not overlap if there is room.
+/// score and reason. Tags with reasons overlap neither each other nor the areas `taken` if there is room.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl Iterator<Item = &'a GraspDetection>,
     min_score: f64,
     reasons: &[(&GraspDetection, String)],
+    mut taken: Vec<BoundingBox>,
 ) {
     let (boxed, marked): (Vec<_>, Vec<_>) =
         detections.partition(|detection| detection.score < min_score && !reasons.is_empty());
@@ -39,7 +40,7 @@ pub fn draw_detections<'a>(
             draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
         }
     }
-    let mut taken: Vec<BoundingBox> = marked.iter().map(|detection| detection.bbox).collect();
+    taken.extend(marked.iter().map(|detection| detection.bbox));
     let marked: Vec<_> = marked.into_iter().map(|detection| (detection, detection.score >= min_score, None)).collect();
     taken.extend(draw_marked(drawn, &marked));
     for (detection, reason) in reasons {
@@ -95,8 +96,9 @@ const FEATURES: Color = Color([255, 190, 0]);
 const DOT_PX_PER_SIDE: f64 = 400.0;
 
 /// Draws dots where edges (red) or the surface (blue) differ from the demonstration, frames (yellow) where a feature
-/// differs, and a legend; draws nothing if there are no differences.
-pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
+/// differs, and a legend, which covers `parts` as little as possible; draws nothing if there are no differences.
+/// Returns the legend's area.
+pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences], parts: &[BoundingBox]) -> Vec<BoundingBox> {
     let side = f64::from(drawn.width().max(drawn.height()));
     let radius = (0.5 * side / DOT_PX_PER_SIDE).max(0.5);
     for differences in differences {
@@ -107,18 +109,41 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
             .iter()
             .for_each(|square| draw_polygon(drawn, square, &Pen::new(FEATURES).width(2.0 * radius).without_halo()));
     }
-    let text_px = (side / 60.0).max(8.0);
-    let mut bottom = f64::from(drawn.height());
     let shows = |is_there: fn(&Differences) -> bool| differences.iter().any(is_there);
-    let legend = [
+    let lines = [
         (shows(|one| !one.surface.is_empty()), "surface differs from the photo", SURFACE),
         (shows(|one| !one.edges.is_empty()), "edges differ from the photo", EDGES),
         (shows(|one| !one.features.is_empty()), "a feature differs from the photo", FEATURES),
     ];
-    for (_, text, color) in legend.into_iter().filter(|(is_shown, ..)| *is_shown) {
-        draw_label(drawn, Point2::new(0.0, bottom), text, color, text_px);
-        bottom -= 2.5 * text_px;
+    let lines: Vec<_> =
+        lines.iter().filter(|(is_shown, ..)| *is_shown).map(|&(_, text, color)| (text, color)).collect();
+    draw_legend(drawn, &lines, parts)
+}
+
+/// Draws the legend in the corner in which it covers the parts least, preferably the lower left one; returns its area.
+fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingBox]) -> Vec<BoundingBox> {
+    let [width, height] = [drawn.width(), drawn.height()].map(f64::from);
+    let text_px = (width.max(height) / 60.0).max(8.0);
+    let step = 2.5 * text_px;
+    let in_corner = |[x, y]: [f64; 2]| -> Vec<(Point2<f64>, BoundingBox)> {
+        let place = |(row, (text, _)): (usize, &(&str, Color))| {
+            // The first line is the lowest one.
+            let from_top = (lines.len() - row) as f64 * step;
+            let at = Point2::new(x, if y > 0.0 { y - row as f64 * step } else { from_top });
+            (at, label_bounds(drawn, at, text, text_px))
+        };
+        lines.iter().enumerate().map(place).collect()
+    };
+    let covered = |tags: &[(Point2<f64>, BoundingBox)]| -> f64 {
+        tags.iter().flat_map(|(_, tag)| parts.iter().map(|part| part.intersection(tag))).sum()
+    };
+    let corners = [[0.0, height], [width, height], [0.0, 0.0], [width, 0.0]].map(in_corner);
+    // The first of equal ones.
+    let best = corners.into_iter().min_by(|a, b| covered(a).total_cmp(&covered(b))).unwrap_or_default();
+    for ((at, _), (text, color)) in best.iter().zip(lines) {
+        draw_label(drawn, *at, text, *color, text_px);
     }
+    best.into_iter().map(|(_, tag)| tag).collect()
 }
 
 /// Writes score and reason below a detection's box, or further down if a tag or an accepted part is there.
@@ -238,10 +263,10 @@ mod tests {
     fn differences_are_dots_at_their_places_with_a_legend() {
         let count = |picture: &RgbImage, color: Color| picture.pixels().filter(|pixel| pixel.0 == color.0).count();
         let mut drawn = RgbImage::new(400, 300);
-        draw_differences(&mut drawn, &[Differences::default()]);
+        draw_differences(&mut drawn, &[Differences::default()], &[]);
         assert_eq!(drawn, RgbImage::new(400, 300));
         let at = [Point2::new(100.5, 50.5), Point2::new(399.9, 299.9), Point2::new(-5.0, 10.0)];
-        draw_differences(&mut drawn, &[Differences { edges: at.to_vec(), ..Differences::default() }]);
+        draw_differences(&mut drawn, &[Differences { edges: at.to_vec(), ..Differences::default() }], &[]);
         assert_eq!(drawn.get_pixel(100, 50).0, EDGES.0);
         assert_eq!(drawn.get_pixel(0, 10).0, [0; 3]);
         assert!(count(&drawn, EDGES) > 100 && count(&drawn, SURFACE) == 0 && count(&drawn, FEATURES) == 0);
@@ -250,7 +275,25 @@ mod tests {
         draw_differences(
             &mut drawn,
             &[Differences { features: vec![Polygon::from_box(&square)], ..Differences::default() }],
+            &[],
         );
         assert!(drawn.get_pixel(120, 100).0 != [0; 3] && drawn.get_pixel(120, 120).0 == [0; 3]);
+    }
+
+    #[test]
+    fn the_legend_leaves_parts_in_a_corner_visible() {
+        let [left, right] = [0.0, 300.0].map(|x1| BoundingBox { x1, y1: 240.0, x2: x1 + 100.0, y2: 300.0 });
+        let both = Differences {
+            edges: vec![Point2::new(200.5, 150.5)],
+            surface: vec![Point2::new(200.5, 160.5)],
+            ..Differences::default()
+        };
+        for (parts, corner) in [(vec![], [0, 299]), (vec![left], [399, 299]), (vec![left, right], [0, 0])] {
+            let mut drawn = RgbImage::new(400, 300);
+            let legend = draw_differences(&mut drawn, std::slice::from_ref(&both), &parts);
+            assert!(legend.len() == 2 && legend[0].intersection(&legend[1]) == 0.0, "{legend:?}");
+            assert!(legend.iter().all(|tag| parts.iter().all(|part| part.intersection(tag) == 0.0)), "{legend:?}");
+            assert_ne!(drawn.get_pixel(corner[0], corner[1]).0, [0; 3], "at {corner:?}");
+        }
     }
 }

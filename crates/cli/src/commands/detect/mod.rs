@@ -180,10 +180,11 @@ fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImag
     let detections = || found.iter().map(|found| &found.detection);
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
     let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
-    drawing::draw_differences(&mut image, &differences);
+    let parts: Vec<_> = detections().map(|detection| detection.bbox).collect();
+    let legend = drawing::draw_differences(&mut image, &differences, &parts);
     drawing::draw_region(&mut image, wording.detector.region());
     let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
-    drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons);
+    drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons, legend);
     image
 }
 
