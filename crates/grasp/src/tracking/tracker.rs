@@ -191,7 +191,7 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A detection in the newest frame as a track in it, and the reported data; `None` if the camera does not show it.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the picture does not show it.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {

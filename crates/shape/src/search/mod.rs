@@ -150,7 +150,7 @@ const OVERLAP_MARGIN: f64 = 0.15;
 /// Largest difference of the ln sizes of the parts in one picture: two steps of scale. Chosen by hand to save time.
 const SAME_SIZE: f64 = 0.2;
 /// Minimum response of a part in a picture, as a share of the best response of its size. Chosen by hand to save time:
-/// of ten photographed clips in a picture all are found.
+/// ten photographed clips in one picture are all found.
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
