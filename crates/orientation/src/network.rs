@@ -96,7 +96,7 @@ impl OrientationCnn {
         self.classes.forward(self.features(crops))
     }
 
-    /// Returns the features from which the classes are computed, `[N, H]` of the hidden layer.
+    /// Returns the output of the hidden layer, `[N, hidden]`, from which the classes are computed.
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`

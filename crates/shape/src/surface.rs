@@ -246,8 +246,8 @@ struct Correlation {
 }
 
 impl Correlation {
-    /// From sums relative to a colour of the photo and one of the image: of `taught`, `seen`, their squares and their
-    /// products.
+    /// Converts sums (of `taught`, `seen`, their squares and their products) of colours relative to one colour of the
+    /// photo and one of the image.
     fn about(
         [of_photo, of_image]: [[f64; 3]; 2],
         count: f64,

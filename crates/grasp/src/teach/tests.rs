@@ -61,7 +61,7 @@ fn whole_plan(options: &TeachOptions) -> Plan {
     Plan::new(options).unwrap()
 }
 
-/// A preset's plan, small enough for a test, which accepts any network.
+/// A preset's plan, reduced for a test; it accepts any network.
 pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
     shrink(&mut plan.detector.network);

@@ -20,7 +20,7 @@ use crate::same_part::are_outlines_of_same_part;
 const FAR_PX: f64 = 8.0;
 /// Rotation from its track's pose from which a pose counts as distant, in radians. Chosen by hand.
 const FAR_RAD: f64 = 0.15;
-/// Minimum gain of agreement of a pose farther than [`FAR_PX`] or rotated by more than [`FAR_RAD`]. Chosen by hand.
+/// Minimum gain of agreement of a distant pose. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;
 
 /// Whether a track is near enough to the newest frame to be followed into it.

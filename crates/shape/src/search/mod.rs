@@ -485,9 +485,8 @@ fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
     Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
 }
 
-/// The poses in a photo, whose gradients are `photo`, at which the photo resembles a part of about the same size,
-/// wholly or in some of its edges. That part is the taught one or its mirror image; `points` are its edge points at the
-/// swept level.
+/// The poses at which the photo resembles a part of about the same size (the taught one or its mirror image), wholly or
+/// in some of its edges. `photo` are the photo's gradients, `points` the part's edge points at the swept level.
 fn places_in_photo(
     points: &[EdgePoint],
     level_idx: usize,
