@@ -201,8 +201,8 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
 /// The difference by which the rival fits better, weighted by how well the rival fits at all, because a part in other
 /// light or in another roll fits neither photo nor rival; 0 if photo and rival differ too little.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
-    /// Below the first value of its fit, the rival gets no weight, above the second the full weight. Chosen on the
-    /// tuned sets and parts.
+    /// The rival has no weight if its fit is below the first value, and full weight above the second value. Chosen on
+    /// the tuned sets and parts.
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
     if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin * explains }

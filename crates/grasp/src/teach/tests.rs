@@ -1,4 +1,4 @@
-//! Every kind of model, taught in a few steps with small networks on a small synthetic part.
+//! Every kind of model, taught on a small synthetic part; the networks are small and taught in a few steps.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
