@@ -67,7 +67,7 @@ pub struct Tracker {
     searching: Option<u64>,
     /// The time at which the last search began.
     searched_at: Option<Duration>,
-    /// The newest frame at low resolution; `None` before the first.
+    /// The newest frame at low resolution; `None` before the first frame.
     coarse: Option<CoarseView>,
     /// The discontinuity of the newest frame, until the frame is searched.
     gap: Option<Gap>,

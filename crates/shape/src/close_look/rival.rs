@@ -243,7 +243,7 @@ impl LaidOver {
     }
 }
 
-/// The edges present in one and absent in the other, by window.
+/// The edges, by window, of photo or rival that are absent from the other of the two.
 struct Differing {
     windows: Vec<(usize, f32)>,
 }
