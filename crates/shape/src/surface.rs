@@ -1,8 +1,8 @@
 //! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! A lever with nearly the outline of the taught part agrees in its edges (0.71 to 0.75 was measured; the part itself
-//! in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness and
-//! colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
+//! The edges of a lever with nearly the outline of the taught part agree (0.71 to 0.75; the part itself in poor light
+//! has 0.64), but the lever has a hole in place of the part's bushing. The surface shows this: brightness and colour
+//! inside the outline, compared as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
