@@ -141,8 +141,9 @@ const MIN_RIVALS_SHARE: f64 = 0.03;
 /// Minimum score of the size reference. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
-/// The scores of all detections in one picture and their contributions. Each is first scored alone, then relative to
-/// the size of the best one, since the parts of one picture are equally far from the camera.
+/// The scores of all detections in one picture and their contributions. If the part's size is unknown, each is first
+/// scored alone, then relative to the size of the best one, since the parts of one picture are equally far from the
+/// camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
     let surest = || {
         clues

@@ -291,7 +291,7 @@ impl Track {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
-    /// Whether an agreement is so far below its running mean that the part is not there.
+    /// Whether an agreement is far below its running mean.
     pub(super) fn is_poor(&self, followed: &Followed) -> bool {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }
