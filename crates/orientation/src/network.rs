@@ -19,7 +19,7 @@ use crate::error::{OrientationError, Result};
 /// Grey values per unit of the network's input: about the standard deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 
-/// Convolutions of stride 2 and two fully connected layers: logits of the angle classes.
+/// Stages of convolutions that each halve the map, and two fully connected layers: logits of the angle classes.
 #[derive(Module, Debug)]
 pub struct OrientationCnn {
     /// From the crop to the last map.

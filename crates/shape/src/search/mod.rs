@@ -154,8 +154,8 @@ const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
-/// Largest distance of a climb from its start, in places. Slightly more than the distance of the next start. Derived
-/// from this distance, not measured.
+/// Largest distance of a climb from its start, in places. Slightly more than the radius in which a start is the
+/// maximum. Derived from this radius, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 /// Largest distance of a climb from its start in angle and ln scale, in steps of angle.
 const FOLLOW_STEPS: f64 = 1.5;
