@@ -35,7 +35,7 @@ impl Linear {
     }
 }
 
-/// From output, input, tap to tap, input, output, so that the summing loops read adjacent outputs.
+/// Reorders weights from (output, input, tap) to (tap, input, output), so that the summing loops read adjacent outputs.
 fn outputs_last(weights: &[f32], outputs: usize, inputs: usize) -> Vec<f32> {
     let taps = weights.len() / (outputs * inputs);
     let place = |i: usize| {
