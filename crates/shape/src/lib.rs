@@ -32,7 +32,7 @@
 //! | bank | the template turned and scaled in all variants that the search tries |
 //! | place, pitch | where the search puts the part's centre, and the distance between two such places |
 //! | likeness | log-odds of a small network that photo and picture show the same part |
-//! | details | log-odds of a second one, trained on parts and their look-alikes |
+//! | details | log-odds of a second network, trained on parts and their look-alikes |
 //!
 //! This crate plans no grasp; only [`PlanMap`] uses a camera. Parts lie flat: poses are rotations, shifts and scales in
 //! the image plane. The crate uses threads only with the feature `parallel`, and results do not depend on them.

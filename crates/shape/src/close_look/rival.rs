@@ -243,7 +243,7 @@ impl LaidOver {
     }
 }
 
-/// The edges, by window, of photo or rival that are absent from the other of the two.
+/// By window, the edges of one of the two (photo or rival) that the other lacks.
 struct Differing {
     windows: Vec<(usize, f32)>,
 }
