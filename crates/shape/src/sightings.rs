@@ -16,7 +16,7 @@ pub(crate) const FIRST_REACH: usize = 6;
 pub(crate) const LATER_REACH: usize = 3;
 /// Maximum number of crests per point. Chosen by hand, not measured.
 pub(crate) const MAX_CRESTS: usize = 3;
-/// Minimum alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
+/// Minimum alignment of a crest's direction, which noise reduces. Chosen by hand, not measured.
 const MIN_TRUST: f32 = 0.2;
 /// Number of samples along a normal, with one beyond the search distance at both ends; derived.
 const MAX_SAMPLES: usize = 2 * FIRST_REACH + 3;

@@ -471,8 +471,8 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference in reported form; `None` if the camera does not show it or it lies outside the
-/// searched region of the picture.
+/// A detection of the frame of reference in reported form; `None` if it lies outside the picture or outside its
+/// searched region.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
     let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
