@@ -426,8 +426,8 @@ mod tests {
         assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
         let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
         let bushing = Point2::new(40.0, 40.0);
-        // Only cells that the bushing reaches into differ. Their farthest point is 34 pixels from its centre, that of
-        // the plate about 70.
+        // Only cells that the bushing reaches into differ. Their farthest point is 34 pixels from the bushing's centre,
+        // that of the plate about 70.
         assert!(hole.len() > 20 && hole.iter().all(|p| (p - bushing).norm() < 40.0), "{hole:?}");
         assert!(!surface().differing(&plate(1.0, false), &away).is_empty());
     }
