@@ -9,8 +9,8 @@ use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
 /// Penalty of the mean cosine per squared cell of shift. Of 0, 0.005, 0.02, 0.04 and 0.08, the value 0.04 gave the
-/// smallest errors for 192 poses of 24 generated parts with errors of up to a tenth of the part, 8° and 6 %: a median
-/// of 2.9 % of the part, and 8.0 % before the correction.
+/// smallest errors. For 192 poses of 24 generated parts, with errors of up to a tenth of the part, 8° and 6 %, the
+/// correction reduces the median error from 8.0 to 2.9 % of the part.
 const SHIFT_PENALTY: f64 = 0.04;
 /// Penalty per squared radian of rotation and per squared ln of size: twenty times [`SHIFT_PENALTY`].
 const TURN_PENALTY: f64 = 0.8;

@@ -41,7 +41,7 @@ impl BaseWeights {
         self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
     }
 
-    /// Whether the weights come from this project's pretraining, which computes last layers from a part's views.
+    /// Whether these are this project's base weights; others have no imprint.
     pub(crate) fn is_ours(&self) -> bool {
         !self.imprint.is_empty()
     }

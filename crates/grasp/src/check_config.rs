@@ -39,7 +39,7 @@ impl CheckConfig {
 
     /// The values of [`Default`], as a constant.
     ///
-    /// The search's minimum agreement was chosen by hand: all but one in a hundred correct poses exceed it.
+    /// The search's minimum agreement was chosen by hand: 99 of 100 correct poses exceed it.
     pub const DEFAULT: Self = Self {
         search: {
             let mut search = SearchConfig::DEFAULT;

@@ -106,7 +106,7 @@ fn names(of: burn::tensor::DeviceType) -> Vec<String> {
     devices.into_iter().map(name).collect()
 }
 
-/// Opened once because the runtime allows only one; later calls share the device.
+/// The device, opened once because the runtime allows only one; later calls share it.
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 fn open_wgpu() -> Result<Device> {
     use std::sync::OnceLock;

@@ -43,7 +43,7 @@ pub(crate) fn picture([width, height]: [u32; 2], parts: &[PlanarSimilarity]) -> 
     })
 }
 
-/// The part rotated by `angle_deg`, with its centre at (x, y).
+/// The part rotated by `angle_deg`, with the point `MIDDLE` at (x, y).
 pub(crate) fn at(x: f64, y: f64, angle_deg: f64) -> PlanarSimilarity {
     PlanarSimilarity::about(MIDDLE, Point2::new(x, y), Angle::from_degrees(angle_deg), 1.0)
 }

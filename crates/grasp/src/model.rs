@@ -309,7 +309,7 @@ impl GraspModel {
         }
     }
 
-    /// Scores the sightings, first each alone, then relative to the size of the best one.
+    /// Scores the sightings of one picture together.
     fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<Found> {
         let clues: Vec<Clues> = sightings.iter().map(|sighting| self.clues(sighting)).collect();
         let judged = judge_picture(&clues, &self.demonstrations[0].check().score);

@@ -150,7 +150,7 @@ mod tests {
         let size = |extent_px: f64, scale: f64| WorkingSize::new(extent_px, scale);
         assert_eq!(size(120.0, 1.0), WorkingSize { halvings: 0, cutout_scale: 1.0 });
         assert_eq!(size(120.0, 1.01), WorkingSize { halvings: 0, cutout_scale: 1.0 });
-        // 1000 px in the photo and in the picture: 250 px after two halvings, of at most 256 px.
+        // 1000 px in the photo and in the picture: 250 px after two halvings, below the maximum of 256 px.
         assert_eq!(size(1000.0, 1.0), WorkingSize { halvings: 2, cutout_scale: 0.25 });
         // 60 px in the photo, 180 in the picture: 90 px in a picture halved once would require an enlarged cut-out.
         assert_eq!(size(60.0, 3.0), WorkingSize { halvings: 2, cutout_scale: 0.75 });

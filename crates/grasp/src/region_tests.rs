@@ -162,8 +162,7 @@ fn regions_that_cannot_be_searched_are_refused_each_with_its_reason() {
     assert!(with(SearchRegion::new([380, 260, 100, 100]).of_picture(SIZE)).is_ok(), "at the picture's corner");
     let other = refused(&with(SearchRegion::new([0, 0, 300, 200]).of_picture([640, 480])).unwrap(), &picture);
     assert_eq!(other, "expected a picture of 640 × 480 pixels, for which the region was given, found 480 × 360");
-    // The part is 20 to 64 px wide and 91 px from corner to corner; at the smallest size, three quarters, that is 68
-    // px.
+    // The part's box is 64 px wide and high, 91 px from corner to corner; at the smallest size, three quarters, 68 px.
     let small = with(SearchRegion::new([100, 100, 60, 30]).of_picture(SIZE)).unwrap_err().to_string();
     assert!(small.contains("that the part fits in, which is 68 pixels long and "), "{small}");
     assert!(small.ends_with("found 60 × 30 pixels from (100, 100): make it larger"), "{small}");

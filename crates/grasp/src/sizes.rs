@@ -20,8 +20,8 @@ pub(crate) struct SizeRange {
 /// Hypotheses within this ratio are one. Chosen by hand, not measured.
 const SAME_LOG: f64 = 0.03;
 /// Overlapping ranges are searched together if the largest size is at most this many times the smallest, because one
-/// template has its edges at one resolution. With 3, drillscrews taught at three quarters of the pixels were found in
-/// one of nine cases, with 1.9 in seven. Chosen by hand between these two.
+/// template has its edges at one resolution. Drillscrews taught at three quarters of the pixels were found in one of
+/// nine cases with a value of 3, and in seven with 1.9. Chosen by hand.
 const MAX_RATIO: f64 = 1.9;
 
 impl SizeRange {

@@ -141,8 +141,9 @@ const MIN_RIVALS_SHARE: f64 = 0.03;
 /// Minimum score of the size reference. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
-/// The scores of all detections in one picture and their contributions. Each is first scored alone, then relative to
-/// the size of the best one, since the parts of one picture are equally far from the camera.
+/// The scores of all detections in one picture and their contributions. If the part's size is unknown, each is first
+/// scored alone, then relative to the size of the best one, since the parts of one picture are equally far from the
+/// camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
     let surest = || {
         clues
@@ -201,8 +202,8 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
 /// The difference by which the rival fits better, weighted by how well the rival fits at all, because a part in other
 /// light or in another roll fits neither photo nor rival; 0 if photo and rival differ too little.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
-    /// Below the first value of its fit, the rival gets no weight, above the second the full weight. Chosen on the
-    /// tuned sets and parts.
+    /// The rival has no weight if its fit is below the first value, and full weight above the second value. Chosen on
+    /// the tuned sets and parts.
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
     if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin * explains }

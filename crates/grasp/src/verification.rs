@@ -169,8 +169,8 @@ impl PlacedDemonstration<'_> {
 /// Distance from an end of the size range, in ln, within which the end may have stopped the refinement of a pose.
 /// Chosen by hand.
 const END_MARGIN_LOG: f64 = 0.02;
-/// Minimum gain of agreement beyond an end of the size range that shows that the end stopped the refinement. Chosen by
-/// hand.
+/// If the agreement increases by at least this much beyond an end of the size range, the end stopped the refinement.
+/// Chosen by hand.
 const MIN_GAIN_BEYOND_END: f64 = 0.05;
 /// Minimum agreement for a search of the marks; poses below it are refused anyway. Chosen by hand to save time.
 const MIN_MARKED: f64 = 0.3;

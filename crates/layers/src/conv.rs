@@ -16,7 +16,7 @@ use crate::initialization::{Distribution, Initializer};
 pub enum NormKind {
     /// No norm: the convolution has a bias instead.
     Identity,
-    /// Mean and variance over groups of channels of one image, trained.
+    /// Mean and variance over groups of channels of one image; weight and bias are trained.
     Group {
         /// Number of groups.
         num_groups: usize,
@@ -197,7 +197,7 @@ impl ConvTranspose2x {
     /// Initialises the parameters at random for a kernel of 2 or 4 cells; the bias is zero.
     pub fn init(in_channels: usize, out_channels: usize, kernel: usize, init: &mut Initializer) -> Self {
         assert!(kernel == 2 || kernel == 4, "expected a kernel of 2 or 4 cells, found {kernel}");
-        // PyTorch counts the fan of a transposed convolution along its first axis.
+        // PyTorch computes the `fan_out` of a transposed convolution from its first axis, the input channels.
         let distribution = Distribution::he_normal(in_channels * kernel * kernel);
         Self {
             weight: init.param([in_channels, out_channels, kernel, kernel], distribution),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! RgbImage, BoundingBox ─ CropWindow: a square around the box's centre ─ crop, S×S
-//!   ─ OrientationCnn: convolutions of stride 2, two fully connected layers ─ 360 logits
+//!   ─ OrientationCnn: convolutional stages, two fully connected layers ─ 360 logits
 //!   ─ AngleClasses: the peak, and the circular mean around it ─ AngleReading {angle, confidence}
 //! ```
 //!

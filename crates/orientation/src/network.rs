@@ -19,7 +19,7 @@ use crate::error::{OrientationError, Result};
 /// Grey values per unit of the network's input: about the standard deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 
-/// Convolutions of stride 2 and two fully connected layers: logits of the angle classes.
+/// Stages of convolutions that each halve the map, and two fully connected layers: logits of the angle classes.
 #[derive(Module, Debug)]
 pub struct OrientationCnn {
     /// From the crop to the last map.
@@ -96,7 +96,7 @@ impl OrientationCnn {
         self.classes.forward(self.features(crops))
     }
 
-    /// Returns the features from which the classes are computed, `[N, H]` of the hidden layer.
+    /// Returns the output of the hidden layer, `[N, hidden]`, from which the classes are computed.
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`

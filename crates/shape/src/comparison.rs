@@ -137,8 +137,7 @@ pub struct Differences {
 }
 
 impl Comparison<'_> {
-    /// Where edges, surface and features disagree at a pose. It adds nothing to [`Self::evidence`], which comes from
-    /// the same comparison.
+    /// Where edges, surface and features disagree at a pose; for display only.
     pub fn differences(&self, image_from_demonstration: &PlanarSimilarity) -> Differences {
         Differences {
             edges: self.structure.differing(self.picture.field, image_from_demonstration),

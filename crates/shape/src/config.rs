@@ -292,7 +292,7 @@ mod tests {
     fn the_default_is_accepted_and_is_what_the_constants_were() {
         let config = ShapeConfig::default();
         assert_eq!(check_config(&config), Ok(()));
-        // The values before they became a configuration, ordered by their former names and files.
+        // The values before they became fields of a configuration.
         assert_eq!((config.gradient.min_gradient, config.gradient.noise_factor), (1.5, 3.0));
         assert_eq!((config.surface.num_cells, config.surface.cells_share), (6.0, 2.0 / 3.0));
         assert_eq!((config.surface.noise, config.surface.noise_in_cell), (8.0, 6.0));

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ShapeError {
-    /// The outline is not an area: too few vertices, or a coordinate that is not a number.
+    /// The outline is not an area: too few vertices, or a coordinate that is not finite.
     #[error("expected an outline of at least 3 finite vertices, found {found}")]
     OutlineDegenerate {
         /// The number of vertices, or the vertex that is not finite.

@@ -15,8 +15,7 @@ use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
 
-/// Starts: no shortening, and each of these shortenings (ln of the ratio of lengths) in each of `NUM_DIRECTIONS`
-/// directions. The fit from a start moves by about half of a shortening.
+/// Starts: no shortening, and each of these shortenings (ln of the ratio of lengths) in `NUM_DIRECTIONS` directions.
 const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
 const NUM_DIRECTIONS: usize = 6;
 /// Rounds of gathering crests anew. Chosen by hand to save time.

@@ -12,7 +12,7 @@ pub(crate) fn in_lanes<W: WithSimd>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Does the work with the instructions for which the web page is compiled: it downloads one version, not three.
+/// Does the work with the instructions for which the web page is compiled: the page contains one version, not three.
 #[cfg(target_arch = "wasm32")]
 #[inline]
 pub(crate) fn in_lanes<W: WithSimd>(work: W) -> W::Output {

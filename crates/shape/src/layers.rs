@@ -35,7 +35,7 @@ impl Linear {
     }
 }
 
-/// From output, input, tap to tap, input, output, so that the summing loops read adjacent outputs.
+/// Reorders weights from (output, input, tap) to (tap, input, output), so that the summing loops read adjacent outputs.
 fn outputs_last(weights: &[f32], outputs: usize, inputs: usize) -> Vec<f32> {
     let taps = weights.len() / (outputs * inputs);
     let place = |i: usize| {
@@ -207,7 +207,7 @@ mod tests {
         (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
     }
 
-    /// By the definitions, one value at a time, in double precision.
+    /// Computes each value by the definition, in double precision.
     fn naive(map: &[f32], side: usize, layer: &Layer, convolution: &Linear) -> Vec<f64> {
         let out_side = side / layer.stride;
         let mut out = vec![0.0; out_side * out_side * layer.outputs];

@@ -1,10 +1,10 @@
 //! The demonstration laid over an image: whether the part is there, and its pose to a fraction of a pixel.
 //!
 //! A detector taught from one photo also gives detections on other parts, and its poses have errors of some pixels.
-//! Laying the demonstration over the image decides whether it is the part, and corrects the pose. The part's edges are
-//! read from the demonstration once; at a predicted pose their directions are compared with the directions of the
-//! image's gradients (sign ignored, since the background changes), and the pose climbs from there in x, y, angle and
-//! scale.
+//! Laying the demonstration over the image decides whether the detection is the part, and corrects the pose. The part's
+//! edges are read from the demonstration once; at a predicted pose their directions are compared with the directions of
+//! the image's gradients (sign ignored, since the background changes), and the pose climbs from there in x, y, angle
+//! and scale.
 //!
 //! ```text
 //! demonstration, outline ──► ShapeTemplate   edge points per pyramid level, weighted
@@ -32,7 +32,7 @@
 //! | bank | the template turned and scaled in all variants that the search tries |
 //! | place, pitch | where the search puts the part's centre, and the distance between two such places |
 //! | likeness | log-odds of a small network that photo and picture show the same part |
-//! | details | log-odds of a second one, trained on parts and their look-alikes |
+//! | details | log-odds of a second network, trained on parts and their look-alikes |
 //!
 //! This crate plans no grasp; only [`PlanMap`] uses a camera. Parts lie flat: poses are rotations, shifts and scales in
 //! the image plane. The crate uses threads only with the feature `parallel`, and results do not depend on them.

@@ -42,12 +42,12 @@ pub struct PlanMap {
 }
 
 impl PlanMap {
-    /// For a camera that looks at the plane of a plan view.
+    /// The map for a camera that looks at the plane of a plan view.
     pub fn new(camera: &PosedCamera, view: &PlanView) -> Self {
         Self::of([view.width, view.height], |at| camera.project(&view.point(&at)))
     }
 
-    /// For `width` × `height` pixels; `seen` gives the picture position of each point.
+    /// The map of `width` × `height` pixels; `seen` gives the picture position of each point.
     pub fn of([width, height]: [u32; 2], seen: impl Fn(Point2<f64>) -> Option<Point2<f64>>) -> Self {
         let [columns, rows] = [width, height].map(|side| side.div_ceil(CELL) + 1);
         let place = |column: u32, row: u32| Point2::new(f64::from(column * CELL), f64::from(row * CELL));

@@ -58,7 +58,7 @@ impl Pose {
     }
 }
 
-/// From offsets about the part's centre (demonstration pixels) to level pixels, in single precision.
+/// The map from offsets about the part's centre (demonstration pixels) to level pixels, in single precision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LevelMap {
     a: f32,

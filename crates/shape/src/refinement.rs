@@ -30,7 +30,7 @@ const GRID_STEP: f64 = 1.5;
 /// Penalty of agreement for a pose with all coordinates at the limits of the capture range, so that the prediction wins
 /// ties. Chosen by hand, not measured.
 const DISTANCE_PENALTY: f64 = 0.03;
-/// The climb: steps in level pixels of edge movement, and the maximum number of steps. Chosen by hand, not measured.
+/// The climb: steps in level pixels of edge movement, and the maximum number of rounds. Chosen by hand, not measured.
 const CLIMB: CompassSearch =
     CompassSearch { steps: (0.5, 0.1), min_gain: 1e-6, max_rounds: 24, max_evaluations: usize::MAX };
 
@@ -215,7 +215,7 @@ mod tests {
         };
         assert_eq!([1.0, 2.0, 1.0 + 1e-12, 2.0].map(|x| score(&at(x))), [1.0, 2.0, 1.0, 2.0]);
         assert_eq!(computed.get(), 2);
-        // Eight are kept.
+        // Eight scores are kept.
         (10..18).for_each(|x| assert_eq!(score(&at(f64::from(x))), f64::from(x)));
         assert_eq!((score(&at(1.0)), computed.get()), (1.0, 11));
     }

@@ -12,8 +12,8 @@ use sdg_geometry::{GraspLine, Mask, Polygon};
 const MIN_SYMMETRY: f64 = 0.85;
 /// Minimum length over mean width; the parts measured for [`MIN_SYMMETRY`] have at least 3.4.
 const MIN_SLENDERNESS: f64 = 2.5;
-/// Minimum share of the light's variance that is explained by the position across the axis. Those parts have at least
-/// 0.39; flat parts that are as symmetric and as slender have at most 0.19.
+/// Minimum share of the light's variance that is explained by the position across the axis. The parts measured for
+/// [`MIN_SYMMETRY`] have at least 0.39; flat parts that are as symmetric and as slender have at most 0.19.
 const MIN_EXPLAINED: f64 = 0.28;
 /// Minimum change of the light across the axis, as a standard deviation over the mean. Chosen by hand.
 const MIN_CHANGE: f64 = 0.06;

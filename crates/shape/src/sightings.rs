@@ -16,7 +16,7 @@ pub(crate) const FIRST_REACH: usize = 6;
 pub(crate) const LATER_REACH: usize = 3;
 /// Maximum number of crests per point. Chosen by hand, not measured.
 pub(crate) const MAX_CRESTS: usize = 3;
-/// Minimum alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
+/// Minimum alignment of a crest's direction, which noise reduces. Chosen by hand, not measured.
 const MIN_TRUST: f32 = 0.2;
 /// Number of samples along a normal, with one beyond the search distance at both ends; derived.
 const MAX_SAMPLES: usize = 2 * FIRST_REACH + 3;
@@ -191,7 +191,7 @@ mod tests {
             (k as f32 - (reach + 1) as f32 + parabola_peak(before, here, after), trust(k))
         };
         let mut all: Vec<(f32, f32)> = (1..2 * reach + 2).filter(is_crest).map(place).collect();
-        // Of more than three the furthest are replaced by nearer ones.
+        // Of more than three crests, the nearest three are kept.
         all.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         all.truncate(MAX_CRESTS);
         all
@@ -215,7 +215,7 @@ mod tests {
             }
             let mut found: Vec<_> = crests(&samples, 0.5, [0.8, 0.6], reach).into_iter().flatten().collect();
             found.retain(|(_, trust)| *trust > 0.0);
-            // Of two equally near ones the earlier is first.
+            // Of two equally near crests, the earlier is first.
             found.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()).then(a.0.total_cmp(&b.0)));
             let expected = crests_one_by_one(&samples, 0.5, [0.8, 0.6], reach);
             assert_eq!(found, expected, "round {round}");

@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn what_lies_outside_is_counted_and_nothing_else_changes() {
-        // The plate's right half is beyond the border: 140 of its 200 columns are kept.
+        // The plate's right half is beyond the border: 140 of the picture's 200 columns are kept.
         let cropped = image::imageops::crop_imm(&plate(Some(HOLE), 50.0), 0, 0, 140, 140).to_image();
         let pose = PlanarSimilarity { tx: 50.0, ..PlanarSimilarity::IDENTITY };
         let seen = agreement(&cropped, &pose);

@@ -1,8 +1,8 @@
 //! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! A lever with nearly the outline of the taught part agrees in its edges (0.71 to 0.75 was measured; the part itself
-//! in poor light gave 0.64), but has a hole in place of the part's bushing. The surface shows this: brightness and
-//! colour inside the outline, compared as correlations, so that the light's strength and tint do not count.
+//! The edges of a lever with nearly the outline of the taught part agree (0.71 to 0.75; the part itself in poor light
+//! has 0.64), but the lever has a hole in place of the part's bushing. The surface shows this: brightness and colour
+//! inside the outline, compared as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
@@ -246,8 +246,8 @@ struct Correlation {
 }
 
 impl Correlation {
-    /// From sums relative to a colour of the photo and one of the image: of `taught`, `seen`, their squares and their
-    /// products.
+    /// Converts sums (of `taught`, `seen`, their squares and their products) of colours relative to one colour of the
+    /// photo and one of the image.
     fn about(
         [of_photo, of_image]: [[f64; 3]; 2],
         count: f64,
@@ -426,8 +426,8 @@ mod tests {
         assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
         let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
         let bushing = Point2::new(40.0, 40.0);
-        // Cells that the bushing reaches into, the farthest corner of one 34 pixels from its centre; the plate extends
-        // to 70.
+        // Only cells that the bushing reaches into differ. Their farthest point is 34 pixels from the bushing's centre,
+        // that of the plate about 70.
         assert!(hole.len() > 20 && hole.iter().all(|p| (p - bushing).norm() < 40.0), "{hole:?}");
         assert!(!surface().differing(&plate(1.0, false), &away).is_empty());
     }

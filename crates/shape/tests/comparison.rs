@@ -90,7 +90,7 @@ fn scales_stay_in_range() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
     let taught = ShapeSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
-    // Seen from twice as far, the part is half as large, and that is not allowed.
+    // From twice the distance, the part is half as large; the allowed scales exclude this.
     let pivot = outline.bounds().center();
     let shrunk = image::imageops::resize(&image, 320, 240, image::imageops::FilterType::Triangle);
     let (field, table) = (GradientField::new(&shrunk), TableColors::new(&shrunk));

@@ -1,4 +1,4 @@
-//! One program for all tests of this folder: each links the whole crate.
+//! One program for all tests of this folder, because each program links the whole crate.
 #![allow(clippy::unwrap_used)]
 
 mod comparison;

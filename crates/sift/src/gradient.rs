@@ -30,8 +30,8 @@ impl GradientRow {
     }
 }
 
-/// The direction of (dx, dy) in `[0, 2π]`, within 2e-5; zero for a zero vector. It has no branch, so many are
-/// computed at a time.
+/// The direction of (dx, dy) in `[0, 2π]`, within 2e-5; zero for a zero vector. It has no branch, so that many
+/// directions are computed at a time.
 ///
 /// # Source
 /// An odd polynomial of degree 11 for the arctangent on [0, 1], with coefficients of a minimax fit.

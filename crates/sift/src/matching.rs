@@ -19,7 +19,7 @@ const LANES: usize = 16;
 pub struct FeatureMatch {
     /// Index in the first set of features.
     pub query_idx: usize,
-    /// Index in the second.
+    /// Index in the second set of features.
     pub train_idx: usize,
     /// Euclidean distance of the two descriptors, from 0 to √2.
     pub distance: f32,
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_ratio_test_refuses_the_undecided() {
-        // Distances 0.1 from one and 0.9 from the other; then halfway between the two.
+        // The first query is 0.1 rad from one descriptor and 0.9 rad from the other, the second halfway between them.
         let found = match_features(&features(&[0.1, 0.5]), &features(&[0.0, 1.0]), 0.8);
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].query_idx, found[0].train_idx), (0, 0));

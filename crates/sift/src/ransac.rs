@@ -19,7 +19,8 @@ pub struct RansacConfig {
     pub seed: u64,
     /// Maximum number of random pairs of matches; if fewer pairs are possible, all are tried.
     pub max_draws: usize,
-    /// Maximum distance between a keypoint and its match, in pixels, or the keypoint's own σ if that is larger.
+    /// Maximum distance between the predicted and the found position of a keypoint, in pixels; the found keypoint's σ
+    /// if that is larger.
     pub tolerance_px: f64,
     /// Maximum difference between a match's rotation and the similarity's, in radians.
     pub max_turn_difference: f64,

@@ -53,13 +53,14 @@ fn keypoints_and_descriptors_are_those_of_opencv() {
     let mut cosines = Vec::new();
     for expected in &golden {
         let at_place = features.keypoints.iter().enumerate().filter(|(_, k)| {
-            // Both compute in 32 bits, in a different order.
+            // OpenCV and this crate compute in 32 bits, in a different order.
             let apart =
                 (k.position.x - f64::from(expected.place[0])).hypot(k.position.y - f64::from(expected.place[1]));
             apart < 0.01 && (k.sigma / f64::from(expected.sigma) - 1.0).abs() < 0.005
         });
         same_place += usize::from(at_place.clone().next().is_some());
-        // OpenCV uses the nearest of 36 bins, this crate the two nearest: directions differ by a fraction of a bin.
+        // OpenCV adds a sample to the nearest of 36 bins, this crate to the two nearest: directions differ by a
+        // fraction of a bin.
         let turned = |k: &sdg_sift::SiftKeypoint| {
             k.angle.distance(sdg_geometry::Angle::from_degrees(f64::from(expected.degrees))).to_degrees()
         };

@@ -14,7 +14,7 @@ use crate::verdict::Clues;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
 /// Tolerance of a correct pose, as in `sdg evaluate --pictures`: distance between its grasp and the true one, as a
-/// fraction of the diagonal of the demonstration's box in the picture's size.
+/// fraction of the diagonal of the demonstration's box, scaled to the picture.
 const RIGHT_SHARE: f64 = 0.04;
 /// Tolerance of a correct pose in angle, as in `sdg evaluate --pictures`.
 const RIGHT_DEGREES: f64 = 10.0;

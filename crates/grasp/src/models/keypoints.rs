@@ -26,8 +26,8 @@ pub(super) fn on_line(
     })
 }
 
-/// Model C: the mean of the keypoints is the centre of the grasp, and the least-squares line through them gives the
-/// angle. `None` if all keypoints coincide.
+/// The mean of the keypoints is the centre of the grasp, and the least-squares line through them gives the angle.
+/// `None` if all keypoints coincide.
 ///
 /// # Source
 /// Paper, section IV-C.

@@ -66,7 +66,7 @@ pub(crate) enum Reading {
     Mask(MaskMatcher),
 }
 
-/// The detector of a model; `None` for model S.
+/// The kind of a model's detector; `None` for model S.
 #[cfg(any(feature = "teach", test))]
 pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
     match kind {

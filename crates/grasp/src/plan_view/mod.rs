@@ -214,7 +214,7 @@ impl PlanViewDetector {
         self.map.resample_window(picture, window)
     }
 
-    /// The detection in the picture, with its pose in metres; `None` if the camera does not show it.
+    /// The detection in the picture, with its pose in metres; `None` if it is outside the picture.
     pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanViewDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();

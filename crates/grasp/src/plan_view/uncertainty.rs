@@ -47,9 +47,9 @@ pub struct ErrorLength {
     pub pixels: f64,
     /// Growth of the noise's logarithm per unit of missing agreement.
     pub by_disagreement: f64,
-    /// Fraction of the marks' height times the slant.
+    /// Error as a fraction of the marks' height times the slant.
     pub by_slant: f64,
-    /// Fraction of the marks' height.
+    /// Error as a fraction of the marks' height.
     pub by_height: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Compares every model on every device of the build with flex: stage by stage, end to end, and in teaching.
+//! Compares the models with a network on every device of the build with flex: stage by stage, end to end, and in
+//! teaching.
 //!
 //! Requires the features of the devices: `make test-wgpu`, `make test-ndarray`.
 

@@ -45,7 +45,7 @@ struct Seen {
     on_part: Option<f64>,
     /// The network's highest score in a sample without the part.
     without_part: Option<f64>,
-    /// The network's score on the place most similar to the part.
+    /// The network's score on the place most similar to the part, in a sample without it.
     elsewhere: Option<f64>,
     /// Errors of the detections on the part, in pixels of the demonstration and degrees.
     errors: Vec<[f64; 2]>,

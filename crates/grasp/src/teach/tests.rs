@@ -1,4 +1,4 @@
-//! Every kind of model, taught in a few steps with small networks on a small synthetic part.
+//! Every kind of model, taught on a small synthetic part; the networks are small and taught in a few steps.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -61,7 +61,7 @@ fn whole_plan(options: &TeachOptions) -> Plan {
     Plan::new(options).unwrap()
 }
 
-/// A preset's plan, small enough for a test, which accepts any network.
+/// A preset's plan, reduced for a test; it accepts any network.
 pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
     shrink(&mut plan.detector.network);

@@ -112,7 +112,7 @@ fn run_searching_before_answers(
 fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
     let [here, there, elsewhere] = [at(80.0, 90.0, 0.0), at(230.0, 160.0, 90.0), at(240.0, 70.0, 200.0)];
     let frames = [vec![here], vec![here], vec![there], vec![], vec![elsewhere], vec![here, elsewhere], vec![elsewhere]];
-    // At 10 pictures per second, a new object beside the part makes the frame discontinuous.
+    // At 10 pictures per second, every change of the parts makes the frame discontinuous.
     let answers = run_searching_before_answers(&mut tracker(), Duration::from_millis(100), &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, true, true, true, true, true]);
@@ -126,7 +126,7 @@ fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
             assert_at(nearest, pose, &format!("frame {number}"));
         }
     }
-    // At 100 frames per second, it counts as a movement.
+    // At 100 frames per second, these changes count as movements.
     let answers = run_searching_before_answers(&mut tracker(), PERIOD, &frames);
     let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
     assert_eq!(was_searched, [true, false, false, false, false, false, false]);

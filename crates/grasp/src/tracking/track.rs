@@ -171,7 +171,7 @@ impl Track {
         Some((still.score, still.evidence))
     }
 
-    /// Uses the measurements that only a search makes: the marks' shift, the network's score, the close look.
+    /// Uses the marks' shift, the network's score and the close look of a search.
     pub(super) fn take_over(&mut self, found: &Placement, time: Duration) {
         self.cutout_from_marks = found.image_from_cutout.inverse().compose(&found.image_from_marks);
         self.network_score = found.network_score;
@@ -291,7 +291,7 @@ impl Track {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
-    /// Whether an agreement is so far below its running mean that the part is not there.
+    /// Whether an agreement is far below its running mean.
     pub(super) fn is_poor(&self, followed: &Followed) -> bool {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }

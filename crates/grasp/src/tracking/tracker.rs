@@ -67,7 +67,7 @@ pub struct Tracker {
     searching: Option<u64>,
     /// The time at which the last search began.
     searched_at: Option<Duration>,
-    /// The newest frame at low resolution; `None` before the first.
+    /// The newest frame at low resolution; `None` before the first frame.
     coarse: Option<CoarseView>,
     /// The discontinuity of the newest frame, until the frame is searched.
     gap: Option<Gap>,
@@ -191,7 +191,7 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A detection in the newest frame as a track in it, and the reported data; `None` if the camera does not show it.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the picture does not show it.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
@@ -471,8 +471,8 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference in reported form; `None` if the camera does not show it or it lies outside the
-/// searched region of the picture.
+/// A detection of the frame of reference in reported form; `None` if it lies outside the picture or outside its
+/// searched region.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
     let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));

@@ -243,7 +243,7 @@ impl LaidOver {
     }
 }
 
-/// The edges present in one and absent in the other, by window.
+/// By window, the edges of one of the two (photo or rival) that the other lacks.
 struct Differing {
     windows: Vec<(usize, f32)>,
 }

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 
-/// Number of colours that describe a picture.
+/// Maximum number of colours that describe a picture.
 const NUM_COLORS: usize = 8;
 /// The longer side of the reduced picture from which the colours are read.
 const SIDE: u32 = 60;

@@ -150,12 +150,12 @@ const OVERLAP_MARGIN: f64 = 0.15;
 /// Largest difference of the ln sizes of the parts in one picture: two steps of scale. Chosen by hand to save time.
 const SAME_SIZE: f64 = 0.2;
 /// Minimum response of a part in a picture, as a share of the best response of its size. Chosen by hand to save time:
-/// of ten photographed clips in a picture all are found.
+/// ten photographed clips in one picture are all found.
 const SAME_RESPONSE: f64 = 0.85;
 /// Minimum response of a start for a climb. Chosen by hand, not measured.
 const MIN_RESPONSE: f64 = 0.2;
-/// Largest distance of a climb from its start, in places. Slightly more than the distance of the next start. Derived
-/// from this distance, not measured.
+/// Largest distance of a climb from its start, in places. Slightly more than the radius in which a start is the
+/// maximum. Derived from this radius, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 /// Largest distance of a climb from its start in angle and ln scale, in steps of angle.
 const FOLLOW_STEPS: f64 = 1.5;
@@ -485,9 +485,8 @@ fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
     Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
 }
 
-/// The poses in a photo, whose gradients are `photo`, at which the photo resembles a part of about the same size,
-/// wholly or in some of its edges. That part is the taught one or its mirror image; `points` are its edge points at the
-/// swept level.
+/// The poses at which the photo resembles a part of about the same size (the taught one or its mirror image), wholly or
+/// in some of its edges. `photo` are the photo's gradients, `points` the part's edge points at the swept level.
 fn places_in_photo(
     points: &[EdgePoint],
     level_idx: usize,

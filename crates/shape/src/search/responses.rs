@@ -247,12 +247,12 @@ mod tests {
         let field = GradientField::new(&image);
         let responses = Responses::new(field.level(0), 5);
         let at = |k: usize, x: usize| responses.table(table_idx(k, x, 21))[responses.idx_of(x / PITCH, 10)];
-        // The gradient runs along x: direction 0; across is half of the tables away.
+        // The gradient runs along x: direction 0; y is direction `NUM_DIRECTIONS / 2`.
         assert_eq!(at(0, 32), FULL);
         assert_eq!(at(0, 31), FULL);
         assert_eq!(at(NUM_DIRECTIONS / 2, 32), 0);
         assert_eq!(at(0, 10), 0);
-        // cos 45° (half of that in angle) of 15 is 10.6.
+        // Direction 2 is at 22.5°: 15 cos 45° is 10.6.
         assert_eq!(at(2, 32), 11);
     }
 

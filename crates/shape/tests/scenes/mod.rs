@@ -170,7 +170,7 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
-/// A rod, a ring, a plate or a disc of random size: distractors beside the part.
+/// A distractor of random size: a rod, a ring, a plate, a disc, or a rod with a disc.
 pub fn distractor(rng: &mut Pcg64Mcg) -> Part {
     let grey = rng.random_range(0.15..0.85);
     let albedo = [0; 3].map(|_| (grey + rng.random_range(-0.12..0.12f64)).clamp(0.05, 0.95));
