@@ -11,8 +11,8 @@ fi
 unit=$(sed -n "$((SLURM_ARRAY_TASK_ID + before + 1))p" "$folder/slurm/$list.units")
 @COMMAND@ --out "$folder" --unit "$unit" && exit 0
 status=$?
-# A unit that failed for the first time is tried once more, on another node if there is one. The task is requeued, so
-# that arrays that depend on this one keep waiting. Slurm sends SIGTERM to requeued tasks.
+# A unit that failed for the first time is tried once more, on another node if there is one. The task is requeued, so that arrays
+# that depend on this one keep waiting. Slurm sends SIGTERM to requeued tasks.
 shopt -s nullglob
 failures=("$folder/units/$unit"/failed-*.json)
 if [ "${#failures[@]}" -eq 1 ] && scontrol --version >/dev/null 2>&1; then
