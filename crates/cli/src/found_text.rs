@@ -12,21 +12,28 @@ pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Minimum relative difference from the nominal size that is given as a reason. Chosen by hand.
 const SIZE_TOLERANCE: f64 = 0.03;
 
-/// The advice, in words, for a refused detection that may be the part.
-pub fn advice_in_words(advice: Advice) -> &'static str {
+/// The advice, in words, for a refused detection that may be the part. `demonstration` is the word for another
+/// demonstration, `on_size` the advice for a part of a different size.
+pub fn advice_in_words(advice: Advice, demonstration: &str, on_size: &str) -> String {
+    let light = |here: &str| {
+        format!(
+            "if it is the part, it is {here} here than in the photo: a second {demonstration} in this light would help"
+        )
+    };
     match advice {
-        Advice::CheckSize => {
-            "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm"
-        }
-        Advice::DarkerPhoto => {
-            "if it is the part, it is darker here than in the photo: a second --demo in this light would help"
-        }
-        Advice::BrighterPhoto => {
-            "if it is the part, it is brighter here than in the photo: a second --demo in this light would help"
-        }
-        Advice::Uncover => "if it is the part, uncover it, or add a --demo taken from this side",
-        _ => "if it is the part, a second --demo taken from this side would help",
+        Advice::CheckSize => on_size.to_owned(),
+        Advice::DarkerPhoto => light("darker"),
+        Advice::BrighterPhoto => light("brighter"),
+        Advice::Uncover => format!("if it is the part, uncover it, or add a {demonstration} taken from this side"),
+        _ => format!("if it is the part, a second {demonstration} taken from this side would help"),
     }
+}
+
+/// The advice with the options of the command line.
+pub fn advice_with_options(advice: Advice) -> String {
+    const ON_SIZE: &str =
+        "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm";
+    advice_in_words(advice, "--demo", ON_SIZE)
 }
 
 /// Inputs of the texts about the detections in a picture.
@@ -128,7 +135,7 @@ impl Wording<'_> {
         Some(format!(
             "{}{}",
             self.reasons(detection, 2),
-            advice.map(|advice| format!("; {}", advice_in_words(advice))).unwrap_or_default()
+            advice.map(|advice| format!("; {}", advice_with_options(advice))).unwrap_or_default()
         ))
     }
 

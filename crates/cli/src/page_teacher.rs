@@ -24,7 +24,7 @@ use sdg_grasp::{
 };
 use sdg_inputs::camera_files::CameraFile;
 
-use crate::found_text::{MIN_ADVISED_SCORE, Wording};
+use crate::found_text::{MIN_ADVISED_SCORE, Wording, advice_in_words};
 use crate::paint::Paint;
 
 /// Teaches models with one preset.
@@ -251,18 +251,7 @@ impl TaughtModel for PageModel {
 
 /// The advice as text for the page, which has buttons instead of options.
 fn remedy(advice: Advice) -> String {
-    let words = match advice {
-        Advice::CheckSize => "if it is the part, learn from it: this size is then taught as well",
-        Advice::DarkerPhoto => {
-            "if it is the part, it is darker here than in the photo: a second demonstration in this light would help"
-        }
-        Advice::BrighterPhoto => {
-            "if it is the part, it is brighter here than in the photo: a second demonstration in this light would help"
-        }
-        Advice::Uncover => "if it is the part, uncover it, or add a demonstration taken from this side",
-        _ => "if it is the part, a second demonstration taken from this side would help",
-    };
-    words.to_owned()
+    advice_in_words(advice, "demonstration", "if it is the part, learn from it: this size is then taught as well")
 }
 
 /// `touches` stays empty, because it depends on the other detections.
@@ -305,7 +294,7 @@ mod tests {
     #[test]
     fn advice_about_light_compares_the_picture_with_the_photo() {
         for (advice, light) in [(Advice::DarkerPhoto, "darker"), (Advice::BrighterPhoto, "brighter")] {
-            for text in [crate::found_text::advice_in_words(advice).to_owned(), remedy(advice)] {
+            for text in [crate::found_text::advice_with_options(advice), remedy(advice)] {
                 // In a dark picture, "in brighter light" was read as a demand for more light.
                 let compared = format!("it is {light} here than in the photo: a second ");
                 assert!(text.contains(&compared) && text.ends_with(" in this light would help"), "{text}");

@@ -21,7 +21,7 @@ use region_record::RegionRecord;
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::found_text::{Wording, advice_in_words};
+use crate::found_text::{Wording, advice_with_options};
 use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
@@ -216,7 +216,7 @@ impl Seen {
             let record = |(found, touched): (&&Found, Vec<usize>)| PictureRecord {
                 found: FoundRecord::new(found, detector),
                 size: detector.size_of(&found.detection, self.size),
-                advice: found.detection.advice().map(advice_in_words),
+                advice: found.detection.advice().map(advice_with_options),
                 jaws_touch: touched,
             };
             let line = ImageLine {
@@ -267,7 +267,7 @@ struct PictureRecord {
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    advice: Option<&'static str>,
+    advice: Option<String>,
     /// Indices, in the list of detections, of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     jaws_touch: Vec<usize>,
