@@ -205,8 +205,10 @@ function takenAt(target, from) {
   const { scale } = state.view;
   const near = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
   const end = gripper.length / 2 + KNOB_PX / scale;
-  const handle = near(0) || (isBetween && Math.abs(s) < distanceTo(outline, from)) ? "body" : near(-end) ? "end=start" : near(end) && "end=end";
-  return handle ? overlay.querySelector(`[data-kind=grasp][data-${handle}]`) : taken;
+  const isBody = near(0) || (isBetween && Math.abs(s) < distanceTo(outline, from));
+  const handles = [["body", isBody], ["end=start", near(-end)], ["end=end", near(end)]];
+  const name = handles.find(([, isTaken]) => isTaken)?.[0];
+  return name ? overlay.querySelector(`[data-kind=grasp][data-${name}]`) : taken;
 }
 
 /** The action begun by a pressed pointer. */
