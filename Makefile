@@ -214,11 +214,12 @@ bench-search: setup ## Model S against corrmatch, OpenCV's matchTemplate and LIN
 	target/release/sdg-bench matchers $(if $(QUICK),--rounds 1,--sets "$(or $(SETS),../shared)" --results benches/RESULTS.md)
 	target/release/sdg-bench curves $(if $(QUICK),--secs 0.2,--results benches/RESULTS.md)
 
-# Needs the taught model that `make bench` writes; npm downloads onnxruntime-web.
+# Uses the model that `make bench` writes, or else teaches one; npm downloads onnxruntime-web.
 bench-browser: web ## The page's speed against onnxruntime-web in headless Chromium
 	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	benches/browser/install.sh target/bench/onnxruntime-web
+	[ -f target/bench/pendulum.sdg ] || target/release/sdg teach --seed 1 --demo datasets/demonstrations/pendulum/image.png --out target/bench/pendulum.sdg
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
 # Installs PyPI's ompl in target/plan-peers. Takes a quarter of an hour on two cores.
