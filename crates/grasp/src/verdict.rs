@@ -11,8 +11,8 @@
 //! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
 //! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
 //! other evidence supports is accepted. Only these contradictions can each reject it alone: bare table where the part
-//! should be, more edges than the part has, a better fit of its mirror image, clearly different details and, if the
-//! size is known, another size. The weights come from a logistic regression on generated parts ([`crate::fitting`]).
+//! should be, more edges than the part has, a better fit of its mirror image, and clearly different details. Most
+//! weights come from a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;

@@ -50,7 +50,7 @@ impl PartDetector {
         }
     }
 
-    /// The pixels of a rectangle within the frame of reference.
+    /// The pixels of a rectangle of the searched image.
     pub(super) fn window(&self, picture: &RgbImage, rect: &PixelRect) -> RgbImage {
         match self {
             Self::Picture(_) => {
@@ -61,7 +61,7 @@ impl PartDetector {
         }
     }
 
-    /// The detections in a whole picture, in the frame of reference.
+    /// The detections in a whole picture, in pixels of the searched image.
     fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
         match self {
             Self::Picture(model) => read_sync(model.find_async(picture, Verification::ByShape)),
@@ -77,7 +77,7 @@ impl PartDetector {
         }
     }
 
-    /// Converts a detection to pixels of the picture and to metres; `None` if the camera does not show it.
+    /// Converts a detection to pixels of the picture and to metres; `None` if it is outside the picture.
     pub(super) fn output(&self, detection: GraspDetection) -> Option<(GraspDetection, Option<PlanarPose>)> {
         match self {
             Self::Picture(_) => Some((detection, None)),

@@ -45,14 +45,14 @@ pub enum TrackState {
     Followed,
     /// As `Followed`, for the first time since it was lost: this frame only.
     FoundAgain,
-    /// The part is not visible; the detection is the last confirmed one.
+    /// The part was not confirmed in this frame; the detection is the last confirmed one.
     Lost,
 }
 
 /// A part in the newest frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedPart {
-    /// Number of the part, which is kept while the part is followed and when it is found again; no other part gets it.
+    /// Number of the part, which is kept while the part is followed and when it is found again.
     pub id: u64,
     /// Whether the part is at `detection`.
     pub state: TrackState,

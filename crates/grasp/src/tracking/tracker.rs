@@ -78,7 +78,7 @@ pub struct Tracker {
 enum Gap {
     /// The frame is the first, or was taken long after the one before.
     Unrelated,
-    /// Other objects are visible, and the parts may have moved.
+    /// A part was just lost, or the picture changed beside the parts.
     Changed,
 }
 
@@ -191,7 +191,8 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A detection in the newest frame as a track in it, and the reported data; `None` if the camera does not show it.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the detection cannot be refined
+    /// or reported.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
