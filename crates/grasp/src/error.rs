@@ -15,7 +15,7 @@ pub enum GraspError {
         known: Vec<&'static str>,
         found: String,
     },
-    /// A device that no version has.
+    /// A name that belongs to no device.
     #[error("expected a device out of {}, found \"{found}\"", .known.join(", "))]
     UnknownBackend {
         /// The existing names.

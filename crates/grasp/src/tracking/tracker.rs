@@ -191,8 +191,8 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A detection in the newest frame as a track in it, and the reported data; `None` if the detection cannot be refined
-    /// or reported.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the detection cannot be
+    /// refined or reported.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
