@@ -139,7 +139,7 @@ pub enum GraspError {
         "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"
     )]
     NeedsBaseWeights { preset: &'static str },
-    /// Base weights for another network.
+    /// Base weights that cannot be read or belong to another network.
     #[cfg(feature = "teach")]
     #[error("base weights: {fitting} parameters fit the network; found {found}")]
     BaseWeights {

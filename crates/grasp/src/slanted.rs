@@ -233,8 +233,8 @@ impl LevelImage {
     }
 }
 
-/// Smallest and largest coordinates, relative to the centre, of the level points that correspond to some points of the
-/// picture.
+/// Smallest and largest coordinates in the level picture of some points of the picture, relative to the picture's
+/// centre.
 fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {
