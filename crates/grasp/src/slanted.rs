@@ -39,7 +39,7 @@ const SLANT_GAIN: f64 = 0.03;
 const SURE: f64 = 0.9;
 /// Maximum distance of the level picture's border from its centre, in sides of the picture.
 const MAX_REACH: f64 = 0.75;
-/// Size of the rectified area around a place, in sides of its box.
+/// Margin of the rectified area around a place, in sides of the place's box.
 const MARGIN: f64 = 0.2;
 
 /// Whether the detections in the rectified picture explain more than those in the picture itself. Scores cannot decide

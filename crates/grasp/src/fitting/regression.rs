@@ -29,8 +29,8 @@ const NUM_STEPS: usize = 12;
 /// Ridge penalty, for terms of standard deviation 1: keeps the weight of a term without information finite. Chosen by
 /// hand.
 const RIDGE: f64 = 2e-4;
-/// Minimum fraction of instances with a correct pose among the found ones. Parts with less, which are nearly symmetric,
-/// carry no information about the score.
+/// Minimum fraction of instances with a correct pose among the found poses. Parts with less, which are nearly
+/// symmetric, carry no information about the score.
 const MIN_COVERAGE: f64 = 0.6;
 
 /// A pose used for the regression.

@@ -18,8 +18,8 @@
 //! below [`TrackerConfig::lose_below`] is lost in that frame.
 //!
 //! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
-//! decides where and when searches run, so that the same code runs on two cores, in a browser, and, with the same
-//! result on any machine, in a test.
+//! decides where and when searches run. The same code therefore runs on two cores and in a browser, and gives the same
+//! result in a test on any machine.
 
 mod arrival;
 mod continuity;
