@@ -122,7 +122,7 @@ impl SizedPart {
     /// frame's agreement with `still` has not decreased, the part lies at that pose, and nothing is refined.
     ///
     /// # Units and frames
-    /// Poses map pixels of the cut-out to the detector's frame of reference.
+    /// Poses map pixels of the cut-out to pixels of the searched image: the picture or the plan view.
     pub(super) fn follow(
         &self,
         detector: &PartDetector,

@@ -7,7 +7,7 @@
 //!          │                                              through the frames since, or matched to tracks
 //!          └─ does not continue frame n - 1: PartSearch, before frame n is answered ──────────────────┘
 //! ```
-//! **Glossary.** *Frame of reference*: the pixels in which a model works, of the picture or of its plan view.
+//! **Glossary.** *Searched image*: the picture or its plan view; poses are in its pixels.
 //! *Followed*: refined near the last pose, in a window; nothing outside the window is read. *Captured*: followed with a
 //! wider reach, about five times slower. *Held*: kept at the pose of the last search, because the part has not moved
 //! since. *Carried forward*: a detection in an older frame is followed through the later frames up to the newest.

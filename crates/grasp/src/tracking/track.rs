@@ -204,7 +204,7 @@ impl Track {
         self.correction = Some(PlanarSimilarity::about(middle, middle + shift, turn, scale));
     }
 
-    /// The part's centre for the cut-out's pose `image_from_cutout`, in the frame of reference.
+    /// The part's centre for the cut-out's pose `image_from_cutout`, in pixels of the searched image.
     fn middle(&self, detector: &PartDetector, image_from_cutout: &PlanarSimilarity) -> Point2<f64> {
         image_from_cutout.apply(&self.part.demonstration(detector).marks.bbox.center())
     }

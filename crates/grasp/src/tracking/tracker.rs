@@ -472,8 +472,8 @@ impl Tracker {
     }
 }
 
-/// Converts a detection in the frame of reference to its reported form; `None` if the camera does not show
-/// the part or the part lies outside the searched region of the picture.
+/// Converts a detection in the searched image to its reported form; `None` if the camera does not show the part or the
+/// part lies outside the searched region of the picture.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
     let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
