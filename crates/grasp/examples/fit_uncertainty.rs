@@ -192,7 +192,7 @@ fn loss(measured: &[Measured], length: &ErrorLength) -> f64 {
     Condition::ALL.into_iter().map(of_condition).sum()
 }
 
-/// Changes one constant after the other, by decreasing factors, until nothing improves.
+/// Repeats the best change of one or two constants, by decreasing factors, until nothing improves.
 fn fit(measured: &[Measured], start: &ErrorLength) -> ErrorLength {
     let moved = |length: &ErrorLength, which: usize, factor: f64| {
         let mut moved = *length;

@@ -150,8 +150,8 @@ impl ScoreConfig {
     /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
-    /// The weights for pictures with known lengths, where a part of another size is another part regardless of other
-    /// evidence.
+    /// The weights for pictures with known lengths, where another size outweighs all but the
+    /// strongest other evidence.
     pub(crate) fn of_known_size(self) -> Self {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }

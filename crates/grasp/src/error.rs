@@ -111,7 +111,7 @@ pub enum GraspError {
         /// The number among those pictures, from 1.
         number: usize,
     },
-    /// A demonstration without a shape to compare.
+    /// A demonstration without a shape to compare, or a setting of the search out of range.
     #[error("the demonstration cannot be compared with images: {0}")]
     Shape(#[from] sdg_shape::ShapeError),
     /// A value of a configuration out of its range.
@@ -130,7 +130,7 @@ pub enum GraspError {
         known: Vec<&'static str>,
         found: String,
     },
-    /// Invalid input of the network.
+    /// Invalid input or configuration of the detector.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
     /// A preset that needs base weights, in a build without weights for it.
@@ -139,7 +139,7 @@ pub enum GraspError {
         "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"
     )]
     NeedsBaseWeights { preset: &'static str },
-    /// Base weights for another network.
+    /// Base weights that cannot be read or belong to another network.
     #[cfg(feature = "teach")]
     #[error("base weights: {fitting} parameters fit the network; found {found}")]
     BaseWeights {

@@ -19,7 +19,7 @@ pub enum EvidenceKind {
     Outside,
     /// Resemblance of other objects.
     Resemblance,
-    /// Score of the network that distinguishes parts from background.
+    /// Score of the network that decides whether photo and picture show the same part.
     Likeness,
     /// Score of the network that distinguishes parts from their look-alikes.
     Details,

@@ -17,9 +17,9 @@ use crate::verification::{SearchedImage, differences};
 const MAX_OFF_PX: f64 = 0.5;
 
 impl GraspModel {
-    /// The part's size in the picture relative to that in the photo. If picture and photo have different numbers of
-    /// pixels, relative to the nearest possible nominal size. `None` without verification, and if a slanted camera
-    /// distorts the outline.
+    /// The part's size in the picture relative to that in the photo, or to the nearest nominal size if picture and
+    /// photo have different numbers of pixels. `None` without verification, and if a slanted camera distorts the
+    /// outline.
     pub fn size_of(&self, detection: &GraspDetection, [width, height]: [u32; 2]) -> Option<f64> {
         let (demonstration_idx, pose) = self.pose_of(detection)?;
         let demonstration = &self.demonstrations[demonstration_idx];

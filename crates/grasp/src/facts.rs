@@ -48,7 +48,7 @@ pub struct TeachingFacts {
     /// Smallest and largest size, relative to the nominal one, at which the part is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
-    /// The model's lengths; `None` for a model taught without a camera.
+    /// The lengths of a model for calibrated cameras; `None` for other models.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lengths: Option<Lengths>,
     /// The searched region of pictures; `None` for whole pictures. Teaching itself does not use it.

@@ -9,7 +9,7 @@ const MAX_PIXELS_PER_M: f64 = 1e6;
 /// Maximum height: a part as high as a person. Chosen by hand.
 const MAX_HEIGHT_M: f64 = 2.0;
 
-/// The lengths of a model that was taught with a camera.
+/// The lengths of a model for calibrated cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lengths {
     /// Pixels of the demonstrations per metre.

@@ -315,10 +315,10 @@ fn to_json<T: Serialize>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// The metadata of a file, from the header alone.
+/// The metadata of a file, without reading its tensors.
 ///
 /// # Errors
-/// A header that is not one of a model file.
+/// Bytes of another format, of another version, or of another length than the header states.
 pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
     let metadata = read_metadata(bytes)?;
     Ok(ModelSummary {

@@ -40,7 +40,7 @@ pub(crate) fn values_from_halves(bytes: &[u8]) -> Vec<f32> {
     values
 }
 
-/// Assembles a file: header length, header, tensors in the order of their names.
+/// Assembles a file: header length, header, half-precision tensors by name, other tensors by name.
 pub(crate) fn write(
     metadata: &BTreeMap<String, String>,
     tensors: &BTreeMap<String, (Vec<usize>, TensorBytes)>,

@@ -4,7 +4,7 @@
 //! picture ─ region ─ region and a margin, cut out ─ searched ─ detections in pixels of the picture ─ those that lie in the region
 //! ```
 //! The margin is half the part's length, so that parts with half of their area in the region are usually complete in
-//! the window. Pixels beyond the margin are not read.
+//! the window. Pixels outside the window are not read.
 
 use image::RgbImage;
 use nalgebra::Point2;

@@ -39,7 +39,7 @@ const SLANT_GAIN: f64 = 0.03;
 const SURE: f64 = 0.9;
 /// Maximum distance of the level picture's border from its centre, in sides of the picture.
 const MAX_REACH: f64 = 0.75;
-/// Margin of the rectified area around a place's box, in sides of the box.
+/// Margin of the rectified area around a place, in sides of the place's box.
 const MARGIN: f64 = 0.2;
 
 /// Whether the detections in the rectified picture explain more than those in the picture itself. Scores cannot decide
@@ -233,8 +233,8 @@ impl LevelImage {
     }
 }
 
-/// Smallest and largest coordinates, relative to the centre, of the level points that correspond to some points of the
-/// picture.
+/// Smallest and largest coordinates in the level picture of some points of the picture, relative to the picture's
+/// centre.
 fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {

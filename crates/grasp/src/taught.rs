@@ -150,8 +150,8 @@ impl TaughtDemonstration {
         self.finer_reference.get_or_init(made)
     }
 
-    /// The demonstration with other settings of comparison and search. Of these, a model file stores only the size
-    /// tolerance and the change of the score's bias; the others have their defaults after reading.
+    /// The demonstration with other settings of comparison and search. These are not stored: a model read from a file
+    /// has the size tolerance and the change of the score's bias from teaching, and otherwise the defaults.
     ///
     /// # Errors
     /// A value out of range, or a cut-out without a shape to compare in the outline.

@@ -11,8 +11,8 @@
 //! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
 //! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
 //! other evidence supports is accepted. Only these contradictions can each reject it alone: bare table where the part
-//! should be, more edges than the part has, a better fit of its mirror image, clearly different details and, if the
-//! size is known, another size. The weights come from a logistic regression on generated parts ([`crate::fitting`]).
+//! should be, more edges than the part has, a better fit of its mirror image, and clearly different details. Most
+//! weights come from a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -128,8 +128,7 @@ pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// Log-likelihood ratio of the network's score, on the part over elsewhere; `None` if the network was not
-    /// evaluated.
+    /// Log-likelihood ratio of the network's score, on the part over elsewhere; `None` without a network.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,
@@ -254,7 +253,7 @@ pub(crate) mod tests {
         let best = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max);
         let worst = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MAX, f64::min);
         let config = ScoreConfig::DEFAULT;
-        // The network is not always evaluated: without it, the other terms must suffice.
+        // Model S has no network: the other terms must suffice.
         for asked in [true, false] {
             let terms: Vec<_> = config.terms().into_iter().filter(|(name, _)| asked || *name != "network").collect();
             for (name, term) in &terms {

@@ -56,7 +56,7 @@ impl Shot {
     }
 }
 
-/// The image, halved several times, with its gradients, which all comparisons use.
+/// The image, halved `halvings` times (0 or more), with its gradients, which all comparisons use.
 struct View<'a> {
     halvings: u32,
     below_camera: Point2<f64>,

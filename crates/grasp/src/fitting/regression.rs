@@ -21,16 +21,16 @@ const NUM_TERMS: usize = 14;
 /// Weights and bias.
 type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 
-/// Rounds of choosing poses and fitting; each round moves the weights half-way, to avoid oscillation between two
-/// choices.
+/// Rounds of choosing poses and fitting; each round but the last moves the weights half-way, to avoid oscillation
+/// between two choices.
 const NUM_ROUNDS: usize = 16;
 /// Newton steps of one regression.
 const NUM_STEPS: usize = 12;
 /// Ridge penalty, for terms of standard deviation 1: keeps the weight of a term without information finite. Chosen by
 /// hand.
 const RIDGE: f64 = 2e-4;
-/// Minimum fraction of instances with a correct pose among the found ones. Parts with less, which are nearly symmetric,
-/// carry no information about the score.
+/// Minimum fraction of instances with a correct pose among the found poses. Parts with less, which are nearly
+/// symmetric, carry no information about the score.
 const MIN_COVERAGE: f64 = 0.6;
 
 /// A pose used for the regression.
@@ -87,7 +87,7 @@ fn examples(parts: &[&PartObservations], config: &ScoreConfig) -> Vec<Example> {
 /// The terms' values of every pose of a picture.
 fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f64, NUM_TERMS>> {
     let clues = picture.clues();
-    // A pose's size follows from its contributions.
+    // A pose's squared size difference follows from its contribution.
     let judged = judge_picture(&clues, config);
     clues
         .iter()

@@ -107,7 +107,7 @@ mod tests {
         let compared = |log_odds: f64, cosine| Some(ComparisonEvidence { log_odds, cosine });
         let scores = [-3.0, 0.0, 3.0].map(|log_odds| score(0.7, whole, compared(log_odds, None)));
         assert!(scores[0] < 0.2 && scores[1] < score(0.7, whole, None) && scores[2] > 0.9, "{scores:?}");
-        // Features less similar than those of other objects lower the score, features of the part raise it.
+        // Features as similar as those of other objects lower the score, features of the part raise it.
         let scores = [0.4, NEUTRAL_COSINE, 0.8].map(|cosine| score(0.7, whole, compared(0.0, Some(cosine))));
         assert!(scores[0] < 0.1 && scores[2] > 0.9, "{scores:?}");
         assert_eq!(scores[1], score(0.7, whole, compared(0.0, None)));

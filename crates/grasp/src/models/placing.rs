@@ -1,5 +1,5 @@
-//! The pose of a demonstration from a detection: the estimate of each model, and the pose that fills a box at a known
-//! angle.
+//! The pose of a demonstration from a detection: the demonstration that fits the box best, and the pose that fills a
+//! box at a known angle.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 

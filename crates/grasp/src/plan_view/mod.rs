@@ -94,7 +94,7 @@ impl PlanViewDetector {
     /// Prepares all data that are the same in every picture of the camera.
     ///
     /// # Errors
-    /// A model that was taught without a camera; a camera whose pictures do not show the plane, or not the region.
+    /// A model without lengths; a camera whose pictures do not show the plane, or not the region.
     pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;

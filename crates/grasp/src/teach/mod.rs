@@ -182,7 +182,7 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
     Ok(())
 }
 
-/// Number of scenes in which the resemblance of other objects is measured. Chosen by hand to save time, not measured.
+/// Number of scenes of other objects in which the resemblance is measured. Chosen by hand to save time, not measured.
 const NUM_NEGATIVE_SCENES: u64 = 12;
 /// The number for model S, which must be ready in less than a second. Chosen by hand to save time, not measured.
 pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;

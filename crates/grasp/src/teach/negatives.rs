@@ -1,9 +1,9 @@
 //! Scenes without the part, in which the agreement of other objects with the demonstration is measured.
 //!
 //! The agreement of a demonstration with other objects depends on the part: a ring agrees with everything round, a
-//! housing with many edges with nothing. It is therefore measured in composed scenes during teaching. The highest
-//! agreement varies more with the seed than between parts, so the mean is used: for the paper's eight parts it was 0.26
-//! to 0.39 in 60 composed scenes each; in 60 of the simulator's pictures it differed by at most 0.04.
+//! housing with many edges agrees with no other object. It is therefore measured in composed scenes during teaching.
+//! The highest agreement varies more with the seed than between parts, so the mean is used: for the paper's eight parts
+//! it was 0.26 to 0.39 in 60 composed scenes each; in 60 of the simulator's pictures it differed by at most 0.04.
 
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,

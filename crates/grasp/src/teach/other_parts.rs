@@ -18,7 +18,7 @@ const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.
 /// First seed of the other parts, far from those of the parts for measurements and pretraining.
 const FIRST_SEED: u64 = 1 << 48;
 
-/// Generates `count` parts for training, and a third as many that are held out.
+/// Generates up to `count` parts for training, and a third as many that are held out.
 pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
     let first = FIRST_SEED.wrapping_add(seed.wrapping_mul(10_000));
     let one = |i: usize| demonstration(&Part::generate(first.wrapping_add(i as u64)), &PHOTO, 0);

@@ -21,7 +21,7 @@ const MAX_FOLD: usize = 72;
 /// A network, its training and its augmentation under one name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
-    /// For two cores.
+    /// For two cores: minutes from photo to grasp, or half a minute from this project's base weights.
     #[default]
     Edge,
     /// Detectron2's R50-FPN, fine-tuned from imported weights.
@@ -76,7 +76,7 @@ impl Preset {
         }
     }
 
-    /// The training samples; except for the paper's, at the network's input size, so that no computation is wasted.
+    /// The training samples: except for `paper` at the network's input size, so that no computation is wasted.
     pub(super) fn samples(self) -> AugmentationConfig {
         match self {
             Self::Edge => AugmentationConfig::default().with_output_size(320, 240),

@@ -61,7 +61,7 @@ impl PartDetector {
         }
     }
 
-    /// The detections in a picture, in pixels of the searched image.
+    /// The detections in a whole picture, in pixels of the searched image.
     fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
         match self {
             Self::Picture(model) => read_sync(model.find_async(picture, Verification::ByShape)),

@@ -119,10 +119,10 @@ impl SizedPart {
 
     /// Refines the part near `start`; `None` if too little of it lies in the frame. `correction` is the offset of the
     /// last found pose from the pose by edges alone, applied if it improves the agreement with the frame. If the
-    /// agreement at `still` has not decreased, the part lies at that pose, and nothing is refined.
+    /// frame's agreement with `still` has not decreased, the part lies at that pose, and nothing is refined.
     ///
     /// # Units and frames
-    /// Poses map pixels of the cut-out to the detector's frame of reference.
+    /// Poses map pixels of the cut-out to pixels of the searched image: the picture or the plan view.
     pub(super) fn follow(
         &self,
         detector: &PartDetector,

@@ -55,7 +55,7 @@ impl FrameBuffer {
     }
 
     /// The frame to which a result of frame `number` is carried next; `None` if the newest frame is not much later,
-    /// because every track is followed into that one anyway.
+    /// because every track is followed into the newest frame anyway.
     pub(super) fn next_after(&self, number: u64, time: Duration) -> Option<&BufferedFrame> {
         let newest = self.newest()?;
         if newest.time.saturating_sub(time) <= MAX_STRIDE {

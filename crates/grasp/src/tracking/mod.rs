@@ -7,7 +7,7 @@
 //!          │                                              through the frames since, or matched to tracks
 //!          └─ does not continue frame n - 1: PartSearch, before frame n is answered ──────────────────┘
 //! ```
-//! **Glossary.** *Frame of reference*: the pixels in which a model works, of the picture or of its plan view.
+//! **Glossary.** *Searched image*: the picture or its plan view; poses are in its pixels.
 //! *Followed*: refined near the last pose, in a window; nothing outside the window is read. *Captured*: followed with a
 //! wider reach, about five times slower. *Held*: kept at the pose of the last search, because the part has not moved
 //! since. *Carried forward*: a detection in an older frame is followed through the later frames up to the newest.
@@ -18,8 +18,8 @@
 //! below [`TrackerConfig::lose_below`] is lost in that frame.
 //!
 //! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
-//! decides where and when searches run, so that the same code runs on two cores, in a browser, and, with the same
-//! result on any machine, in a test.
+//! decides where and when searches run. The same code therefore runs on two cores and in a browser, and gives the same
+//! result in a test on any machine.
 
 mod arrival;
 mod continuity;
@@ -45,14 +45,14 @@ pub enum TrackState {
     Followed,
     /// As `Followed`, for the first time since it was lost: this frame only.
     FoundAgain,
-    /// The part is not visible; the detection is the last confirmed one.
+    /// The part was not confirmed in this frame; the detection is the last confirmed one.
     Lost,
 }
 
 /// A part in the newest frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedPart {
-    /// Number of the part, which is kept while the part is followed and when it is found again; no other part gets it.
+    /// Number of the part, which is kept while the part is followed and when it is found again.
     pub id: u64,
     /// Whether the part is at `detection`.
     pub state: TrackState,

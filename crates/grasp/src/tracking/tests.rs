@@ -195,8 +195,7 @@ fn the_same_frames_give_the_same_tracks() {
     assert_eq!(one, again);
 }
 
-/// A part that leaves the region is lost, although it is still in the picture; a part that is never in the region is
-/// never found.
+/// A part that leaves the region is lost, although it is still in the picture.
 #[test]
 fn with_a_region_parts_are_followed_in_it_alone() {
     let region = SearchRegion::new([40, 30, 180, 180]);

@@ -109,7 +109,7 @@ pub(super) struct Track {
     turn_source: TurnSource,
     /// The offset of the searches' poses from the poses by edges alone, in the cut-out's frame.
     correction: Option<PlanarSimilarity>,
-    /// The pose of the last search if it is too distant for a correction; tried in the next frame.
+    /// The offset of the last search's pose if it is too large for a correction; tried in the next frame.
     alternative: Option<PlanarSimilarity>,
     /// The last search's result; `None` once the part has moved.
     still: Option<Still>,
@@ -204,7 +204,7 @@ impl Track {
         self.correction = Some(PlanarSimilarity::about(middle, middle + shift, turn, scale));
     }
 
-    /// The part's centre for the cut-out's pose `image_from_cutout`, in the frame of reference.
+    /// The part's centre for the cut-out's pose `image_from_cutout`, in pixels of the searched image.
     fn middle(&self, detector: &PartDetector, image_from_cutout: &PlanarSimilarity) -> Point2<f64> {
         image_from_cutout.apply(&self.part.demonstration(detector).marks.bbox.center())
     }
@@ -291,7 +291,7 @@ impl Track {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
-    /// Whether an agreement is far below its running mean.
+    /// Whether an agreement is so far below its running mean that the part may not be there.
     pub(super) fn is_poor(&self, followed: &Followed) -> bool {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }
@@ -354,7 +354,7 @@ impl Track {
         self.history.get(idx).copied()
     }
 
-    /// Continues from another pose of the same part; number, age and history are kept.
+    /// Continues from another pose of the same part; id, age and earlier history are kept.
     pub(super) fn replace_by(&mut self, other: Self) {
         let mut history = std::mem::take(&mut self.history);
         history.retain(|past| other.history.front().is_none_or(|first| past.number < first.number));

@@ -78,7 +78,7 @@ pub struct Tracker {
 enum Gap {
     /// The frame is the first, or was taken long after the one before.
     Unrelated,
-    /// Other objects are visible, and the parts may have moved.
+    /// A part was just lost, or the picture changed beside the parts.
     Changed,
 }
 
@@ -191,7 +191,8 @@ impl Tracker {
         Ok(self.parts())
     }
 
-    /// A detection in the newest frame as a track in it, and the reported data; `None` if the picture does not show it.
+    /// A detection in the newest frame as a track in it, and the reported data; `None` if the detection cannot be
+    /// refined or reported.
     fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
         let mut track = Track::new(&self.detector, frame, found)?;
         if let Some((idx, ..)) = self.matched(found, frame.number) {
@@ -471,8 +472,8 @@ impl Tracker {
     }
 }
 
-/// A detection of the frame of reference in reported form; `None` if it lies outside the picture or outside its
-/// searched region.
+/// Converts a detection in the searched image to its reported form; `None` if the camera does not show the part or the
+/// part lies outside the searched region of the picture.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
     let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
