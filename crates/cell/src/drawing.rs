@@ -128,8 +128,10 @@ fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingB
     let in_corner = |[x, y]: [f64; 2]| -> Vec<(Point2<f64>, BoundingBox)> {
         let place = |(row, (text, _)): (usize, &(&str, Color))| {
             // The first line is the lowest one.
-            let from_top = (lines.len() - row) as f64 * step;
-            let at = Point2::new(x, if y > 0.0 { y - row as f64 * step } else { from_top });
+            let rows_down = if y > 0.0 { -(row as f64) } else { (lines.len() - 1 - row) as f64 };
+            // The lowest y at which the line is inside the picture.
+            let top = label_bounds(drawn, Point2::new(x, 0.0), text, text_px).y2;
+            let at = Point2::new(x, y.max(top) + rows_down * step);
             (at, label_bounds(drawn, at, text, text_px))
         };
         lines.iter().enumerate().map(place).collect()

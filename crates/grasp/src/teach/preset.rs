@@ -21,7 +21,7 @@ const MAX_FOLD: usize = 72;
 /// A network, its training and its augmentation under one name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
-    /// For two cores: minutes from photo to grasp, or half a minute from this project's base weights.
+    /// For two cores.
     #[default]
     Edge,
     /// Detectron2's R50-FPN, fine-tuned from imported weights.
