@@ -139,7 +139,7 @@ fn in_a_new_folder_the_photo_is_chosen_and_the_name_is_asked_for_once() {
     photo_of_page(&page, "IMG_2.png");
     // The folder's name is proposed, because file names of cameras carry no meaning.
     assert_eq!(page.browser.run("return document.getElementById('label').value", &[]).unwrap(), json!("lever"));
-    assert!(page.text("#naming").contains("is a proposal"));
+    assert!(page.text("#naming").contains("Proposed name."));
     theme(&page, "named");
     page.click("#keep-name");
     page.wait_for("no question", "return document.getElementById('naming').hidden");
