@@ -11,7 +11,7 @@ pub struct Peer {
     pub wanted: Option<f64>,
 }
 
-/// A computation that both sides do.
+/// A computation that our program and the peers do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkSpec {
     /// Name for the workers.
@@ -52,7 +52,7 @@ pub const GEMM: WorkSpec = compared("gemm", "product of two 2048×2048 matrices"
 const TORCHVISION: &[Peer] = &[peer("pytorch", "torchvision", 2.0)];
 const TRAINING: &[Peer] = &[peer("pytorch", "PyTorch", 1.5)];
 
-/// All works, in the order in which they run.
+/// All works in the order in which they run, except `GEMM`, which runs first.
 pub const WORKS: &[WorkSpec] = &[
     compared(
         "backbone",

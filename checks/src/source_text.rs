@@ -1,4 +1,4 @@
-//! Rust source without comments, contents of strings, and items under `#[cfg(test)]`.
+//! Removes comments, contents of strings, and items under `#[cfg(test)]` from Rust source.
 
 use std::collections::BTreeSet;
 

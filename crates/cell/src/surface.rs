@@ -35,7 +35,7 @@ const MAX_WINDOWS: usize = 60;
 const MIN_WINDOWS: usize = 5;
 /// Maximum distance of a window's height from the median of its surface, in metres.
 const INLIER_M: f64 = 0.001;
-/// Number of iterations of the median.
+/// Number of times that the height is replaced by the median of the windows near it.
 const NUM_SHIFTS: usize = 4;
 /// Minimum fraction of all windows that must be on the surface.
 const MIN_SHARE: f64 = 0.3;

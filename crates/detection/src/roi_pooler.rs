@@ -28,7 +28,7 @@ pub fn assign_level(corners: &Corners, config: &RoiPoolerConfig) -> usize {
         LevelEpsilon::InsideLog(eps) => (size / canonical + eps as f32).log2(),
         LevelEpsilon::OutsideLog(eps) => (size / canonical).log2() + eps as f32,
     };
-    // A box without area has log -inf, which the cast saturates.
+    // A box without area has a log of -inf or about -27, and gets the finest level.
     let level = (config.canonical_level as f32 + log).floor() as i64;
     level.clamp(*POOLED_LEVELS.start() as i64, *POOLED_LEVELS.end() as i64) as usize
 }

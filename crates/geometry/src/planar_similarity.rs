@@ -36,8 +36,8 @@ impl PlanarSimilarity {
         made
     }
 
-    /// The least-squares similarity that maps `from[i]` to `to[i]`; `None` for fewer than two distinct points in `from`
-    /// or in `to`.
+    /// The least-squares similarity that maps `from[i]` to `to[i]`; `None` if it is not unique, for example for fewer
+    /// than two distinct points in `from` or in `to`.
     ///
     /// # Source
     /// Umeyama 1991; in two dimensions, complex numbers give the closed form.

@@ -44,7 +44,8 @@ impl CameraFile {
     /// The perception of a model with this camera.
     ///
     /// # Errors
-    /// The model was taught without a camera, or the camera does not see the plane of the marks.
+    /// The model was taught without a camera, the camera does not see the plane of the marks, or the model's region is
+    /// not inside the camera's pictures.
     pub fn perception(&self, model: GraspModel) -> Result<Perception> {
         Ok(Perception::calibrated(model, &self.camera)?)
     }
@@ -99,7 +100,7 @@ impl CameraFile {
 ///
 /// # Errors
 /// The camera file cannot be used, or the camera does not see the plane of the marks (with the camera file's name); or
-/// the model was taught without a camera (with the model file's name).
+/// the model was taught without a camera, or its region is outside the pictures (with the model file's name).
 pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
     let Some(path) = camera else { return Ok(Perception::of_any_camera(model)) };
     CameraFile::read(path)?.perception(model).map_err(|error| {

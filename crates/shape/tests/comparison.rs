@@ -1,4 +1,4 @@
-//! Edges and surface together: poses that were refined poorly by edges are refined again.
+//! Refinement by edges and surface colours together, of poses that refinement by edges alone left wrong.
 
 use crate::scenes;
 use image::{Rgb, RgbImage};
@@ -20,7 +20,7 @@ struct Outcome {
     last: f64,
 }
 
-/// A part of the test scenes on a random table in random light.
+/// Refines a wrong pose of a part on a random table in random light.
 fn refined_outcome(part_idx: usize, seed: u64) -> Outcome {
     let parts = scenes::parts();
     let part = &parts[part_idx];

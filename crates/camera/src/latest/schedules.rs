@@ -1,4 +1,4 @@
-//! All orders of up to seven steps of a camera's thread and of a caller of [`LatestFrame`] (the cell), compared with a
+//! All orders of up to seven steps of a camera's thread and of a caller of [`LatestFrame`], compared with a
 //! model without threads. Steps do not overlap, because every operation on the cell holds one lock.
 
 use std::collections::VecDeque;
@@ -44,8 +44,8 @@ fn check(schedule: &[Turn]) {
     let (send, receive) = channel();
     let (asked, was_asked) = channel();
     let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
-    // Declared last, so that it is dropped first if an assertion fails; otherwise `latest` would wait for its thread
-    // for ever.
+    // Declared after `latest`, so that it is dropped first if an assertion fails; otherwise `latest` would wait for its
+    // thread for ever.
     let send = send;
     was_asked.recv().unwrap();
     let mut model = Model::default();

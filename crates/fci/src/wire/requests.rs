@@ -32,8 +32,8 @@ pub struct MoveRequest {
     pub max_goal_deviation: Deviation,
 }
 
-/// Thresholds of external torques (N·m) and forces (N, N·m). Above the lower thresholds the robot reports a contact;
-/// above the upper ones it reports a collision and stops.
+/// Thresholds of external joint torques (N·m) and of the external wrench (N, N·m). Above the lower thresholds the robot
+/// reports a contact; above the upper ones it reports a collision and stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollisionBehavior {
     /// Thresholds of contacts while the arm accelerates.
@@ -146,7 +146,7 @@ impl Request {
         }
     }
 
-    /// The message, including its header; `None` for a command that the version does not have.
+    /// The message, including its header; `None` for a command or generator that the version does not have.
     pub fn encode(&self, command_id: u32, version: Version) -> Option<Vec<u8>> {
         let number = self.command().number(version)?;
         let mut encoder = Encoder::new(Real::F64);

@@ -12,8 +12,8 @@ use super::paint::{fill, inside_of};
 
 /// Draws a tag with one line of text; `height_px` is the height of its capitals.
 ///
-/// `at` is the tag's lower left corner. A tag that would extend beyond the picture is moved inside, so that a label
-/// above a box at the upper edge is readable. The text is dark on light colours and light on dark ones.
+/// `at` is the tag's lower left corner. A tag that would extend beyond the picture is moved inside as far as it fits,
+/// so that a label above a box at the upper edge is readable. The text is dark on light colours and light on dark ones.
 pub fn draw_label(image: &mut RgbImage, at: Point2<f64>, text: &str, color: Color, height_px: f64) {
     if !(at.x.is_finite() && at.y.is_finite() && height_px.is_finite() && height_px > 0.0) || text.is_empty() {
         return;
