@@ -219,7 +219,7 @@ bench-browser: web ## The page's speed against onnxruntime-web in headless Chrom
 	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	benches/browser/install.sh target/bench/onnxruntime-web
-	[ -f target/bench/pendulum.sdg ] || target/release/sdg teach --seed 1 --demo datasets/demonstrations/pendulum/image.png --out target/bench/pendulum.sdg
+	[ -f target/bench/pendulum.sdg ] || target/release/sdg teach --seed 1 --demo datasets/demonstrations/pendulum/image.png:datasets/demonstrations/pendulum/annotation.json --out target/bench/pendulum.sdg
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
 # Installs PyPI's ompl in target/plan-peers. Takes a quarter of an hour on two cores.
