@@ -203,10 +203,10 @@ function takenAt(target, from) {
   const [t, s] = [along, quarter(along)].map((axis) => dot(arm, axis));
   const isBetween = Math.abs(t) <= gripper.length / 2 && Math.abs(s) <= gripper.width / 2;
   const { scale } = state.view;
-  const near = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
+  const isNear = (place) => "line" in taken.dataset && Math.hypot(t - place, s) * scale <= REACH_PX;
   const end = gripper.length / 2 + KNOB_PX / scale;
-  const isBody = near(0) || (isBetween && Math.abs(s) < distanceTo(outline, from));
-  const handles = [["body", isBody], ["end=start", near(-end)], ["end=end", near(end)]];
+  const isBody = isNear(0) || (isBetween && Math.abs(s) < distanceTo(outline, from));
+  const handles = [["body", isBody], ["end=start", isNear(-end)], ["end=end", isNear(end)]];
   const name = handles.find(([, isTaken]) => isTaken)?.[0];
   return name ? overlay.querySelector(`[data-kind=grasp][data-${name}]`) : taken;
 }

@@ -120,10 +120,15 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences], parts
     draw_legend(drawn, &lines, parts)
 }
 
+/// Height of the capitals of a legend or a reason, in pixels.
+fn text_height_px(drawn: &RgbImage) -> f64 {
+    (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0)
+}
+
 /// Draws the legend in the corner in which it covers the parts least, preferably the lower left one; returns its area.
 fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingBox]) -> Vec<BoundingBox> {
     let [width, height] = [drawn.width(), drawn.height()].map(f64::from);
-    let text_px = (width.max(height) / 60.0).max(8.0);
+    let text_px = text_height_px(drawn);
     let step = 2.5 * text_px;
     let in_corner = |[x, y]: [f64; 2]| -> Vec<(Point2<f64>, BoundingBox)> {
         let place = |(row, (text, _)): (usize, &(&str, Color))| {
@@ -150,7 +155,7 @@ fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingB
 
 /// Writes score and reason below a detection's box, or further down if a tag or an accepted part is there.
 fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
-    let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
+    let text_px = text_height_px(drawn);
     let max_width = MAX_REASON_SHARE * f64::from(drawn.width());
     let is_short = |text: &str| label_bounds(drawn, Point2::origin(), text, text_px).width() <= max_width;
     let lines = wrapped(&format!("{:.2} refused: {reason}", detection.score), is_short);

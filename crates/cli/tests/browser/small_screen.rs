@@ -21,10 +21,12 @@ const OVERLAPS: &str = "const items = [...document.querySelectorAll('.todo li')]
 /// The marks on the photo are left out.
 const OUT_OF_ORDER: &str = "const all = document.querySelectorAll(arguments[0]);
     const controls = [...all].flatMap((e) => [...e.querySelectorAll('button, input, select, summary, [tabindex]')])
-        .filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex >= 0 && !e.closest('#overlay, #toasts, dialog'));
+        .filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex >= 0)
+        .filter((e) => !e.closest('#overlay, #toasts, dialog'));
     const name = (e) => e.id || e.innerText;
     const ahead = controls.filter((e) => e.tabIndex > 0).map(name);
-    const isAbove = (a, b) => Math.abs(a.top + a.bottom - b.top - b.bottom) < 8 ? a.left < b.left : a.bottom <= b.top + 1;
+    const isInRow = (a, b) => Math.abs(a.top + a.bottom - b.top - b.bottom) < 8;
+    const isAbove = (a, b) => isInRow(a, b) ? a.left < b.left : a.bottom <= b.top + 1;
     const rect = (e) => e.getBoundingClientRect();
     const pairs = controls.slice(1).map((e, i) => [controls[i], e]);
     const wrong = pairs.filter(([a, b]) => isAbove(rect(b), rect(a))).map(([a, b]) => `${name(a)}, ${name(b)}`);
