@@ -3,7 +3,7 @@
 //! ```text
 //! demonstration ─ edge points of a coarse level ─ Bank: every angle and scale as shifts into tables
 //! image ─ GradientField ─ coarse level ─ Responses: look-up tables for each direction
-//!                                           │
+//!                                           │   (large pictures: a sweep of the next coarser level selects places)
 //!                    sweep: every place × every variant ─ local maxima of every scale: starts
 //!                                           │
 //!          climb the agreement at a coarse level, 64 at a time; climb and snap the best level by level, eight at a time, as
@@ -15,6 +15,7 @@
 
 mod bank;
 mod responses;
+mod screen;
 mod sweep;
 #[cfg(test)]
 mod tests;
@@ -41,6 +42,7 @@ use crate::profile::Profile;
 use crate::revolution::Revolution;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
+use crate::search::screen::Screen;
 use crate::search::sweep::{Start, sweep};
 use crate::structure::Structure;
 use crate::surface::Surface;
@@ -190,6 +192,8 @@ pub struct ShapeSearch {
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
+    /// `None` if the part has too few edges at the next coarser level.
+    screen: Option<Screen>,
 }
 
 impl ShapeSearch {
@@ -207,6 +211,8 @@ impl ShapeSearch {
         let field = GradientField::with_config(image, &config.shape.gradient);
         let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
         let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
+        let screen = points_at(&field, &template, outline, config, sweep_level_idx + 1)
+            .and_then(|points| Screen::new(&points, config.num_points, sweep_level_idx + 1, log_scales));
         let close_up = CloseUp::new(image, outline);
         let turned = || {
             let own_places = places_in_photo(&points, sweep_level_idx, &template, &field, config);
@@ -235,6 +241,7 @@ impl ShapeSearch {
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
             sweep_level_idx,
+            screen,
         })
     }
 
@@ -254,7 +261,8 @@ impl ShapeSearch {
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
-        let starts = sweep(&responses, &self.bank, self.config.max_starts, MIN_RESPONSE);
+        let area = self.screen.as_ref().and_then(|screen| screen.area(field, &responses, MIN_RESPONSE));
+        let starts = sweep(&responses, &self.bank, area.as_ref(), self.config.max_starts, MIN_RESPONSE);
         let best = self.apart(self.follow_best(picture, starts));
         let polished = self.polish(picture, best);
         let mut matches = self.apart(polished);
@@ -499,7 +507,7 @@ fn places_in_photo(
     const SAME_LOG_SCALES: [f64; 2] = [-0.02, 0.02];
     const REACH: Reach = Reach { shift_px: 8.0, turn_rad: 0.1, log_scale: 0.02 };
     let bank = Bank::new(points, config.num_points, (1u32 << level_idx) as f64, SAME_LOG_SCALES);
-    let starts = sweep(&Responses::new(photo.level(level_idx), bank.reach), &bank, MAX_PLACES, MIN_RESPONSE);
+    let starts = sweep(&Responses::new(photo.level(level_idx), bank.reach), &bank, None, MAX_PLACES, MIN_RESPONSE);
     parallel::map(&starts, |start| {
         let pose = pose_of(start, &bank, level_idx).to_similarity(template.center);
         template.captured(photo, &pose, &REACH)
@@ -516,6 +524,23 @@ fn sweep_points(
     let bounds = outline.bounds();
     let extent = bounds.width().max(bounds.height());
     let coarsest = ((extent / SWEEP_EXTENT).log2().floor().max(0.0) as usize).min(field.num_levels() - 1);
+    let points_of = |idx: usize| points_at(field, template, outline, config, idx).unwrap_or_default();
+    let (mut idx, mut points) = (coarsest, points_of(coarsest));
+    while idx > 0 && points.len() < MIN_SWEEP_POINTS {
+        idx -= 1;
+        points = points_of(idx);
+    }
+    (idx, points)
+}
+
+/// The edge points of a level; `None` if there is no such level.
+fn points_at(
+    field: &GradientField,
+    template: &ShapeTemplate,
+    outline: &Polygon,
+    config: &SearchConfig,
+    idx: usize,
+) -> Option<Vec<EdgePoint>> {
     let selection = EdgeSelection {
         outline,
         center: template.center,
@@ -523,13 +548,7 @@ fn sweep_points(
         outline_weight: config.shape.outline_weight,
         inner_weight: 1.0,
     };
-    let points_at = |idx: usize| select_edge_points(field.level(idx), (1u32 << idx) as f64, &selection);
-    let (mut idx, mut points) = (coarsest, points_at(coarsest));
-    while idx > 0 && points.len() < MIN_SWEEP_POINTS {
-        idx -= 1;
-        points = points_at(idx);
-    }
-    (idx, points)
+    (idx < field.num_levels()).then(|| select_edge_points(field.level(idx), (1u32 << idx) as f64, &selection))
 }
 
 const _: () =

@@ -37,7 +37,14 @@ pub(crate) struct Start {
 }
 
 /// The `count` best local maxima, none below `min_response`: first the best of each scale, then the second of each.
-pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_response: f64) -> Vec<Start> {
+/// With an area, only its places are tried.
+pub(crate) fn sweep(
+    responses: &Responses,
+    bank: &Bank,
+    area: Option<&Area>,
+    count: usize,
+    min_response: f64,
+) -> Vec<Start> {
     let (width, height) = (responses.width, responses.height);
     if width == 0 || height == 0 || bank.num_points == 0 {
         return Vec::new();
@@ -48,14 +55,16 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
     let groups = Groups::of(bank);
     let stretches: Vec<usize> = (first..end).step_by(STRETCH).collect();
     let swept = parallel::map(&stretches, |&at| {
-        in_lanes(SweepStretch { responses, shifts: &shifts, groups: &groups, at, len: STRETCH.min(end - at) })
+        let blocks: Vec<usize> =
+            (at..end.min(at + STRETCH)).step_by(BLOCK).filter(|&at| Area::has(area, at - first)).collect();
+        in_lanes(SweepStretch { responses, shifts: &shifts, groups: &groups, at, blocks: &blocks })
     });
 
     let full = f64::from(FULL) * bank.num_points as f64;
     let least = (min_response * full).ceil() as i16;
     let of_groups: Vec<usize> = (0..groups.count).collect();
     let mut starts = parallel::map(&of_groups, |&group| {
-        let field = PeakField::new(responses, |offset| &swept[offset / STRETCH].sums[group][offset % STRETCH..]);
+        let field = PeakField::new(responses, |offset| swept[offset / STRETCH].sums_from(group, offset % STRETCH));
         let start = |(place, sum): ([usize; 2], i16)| {
             let offset = responses.idx_of(place[0], place[1]) - first;
             Start {
@@ -81,6 +90,41 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_respon
     ranked.into_iter().map(|(_, start)| start).collect()
 }
 
+/// A part of the places, in blocks of [`BLOCK`] adjacent places.
+#[derive(Debug)]
+pub(crate) struct Area {
+    blocks: Vec<bool>,
+}
+
+impl Area {
+    pub(crate) fn none_of(responses: &Responses) -> Self {
+        let len = responses.height * responses.stride();
+        Self { blocks: vec![false; len.div_ceil(BLOCK)] }
+    }
+
+    /// Adds the blocks with places at most `radius` columns and rows from `center`.
+    pub(crate) fn add(&mut self, responses: &Responses, center: [usize; 2], radius: usize) {
+        let near = |at: usize, end: usize| at.saturating_sub(radius)..(at + radius + 1).min(end);
+        let first = responses.idx_of(0, 0);
+        let columns = near(center[0], responses.width);
+        for y in near(center[1], responses.height).filter(|_| !columns.is_empty()) {
+            let [from, to] = [columns.start, columns.end - 1].map(|x| (responses.idx_of(x, y) - first) / BLOCK);
+            self.blocks[from..=to].fill(true);
+        }
+    }
+
+    /// The share of the blocks that belong to the area.
+    #[cfg(test)]
+    pub(crate) fn share(&self) -> f64 {
+        self.blocks.iter().filter(|&&is_swept| is_swept).count() as f64 / self.blocks.len() as f64
+    }
+
+    /// Whether the block from an offset on belongs to the area; everything does without one.
+    fn has(area: Option<&Self>, offset: usize) -> bool {
+        area.is_none_or(|area| area.blocks[offset / BLOCK])
+    }
+}
+
 /// The variants that compete with each other at a place.
 struct Groups {
     count: usize,
@@ -104,7 +148,7 @@ struct PeakField {
 }
 
 impl PeakField {
-    /// `sums_from` returns the sums from an offset on, relative to the first place.
+    /// `sums_from` returns the sums from an offset on, relative to the first place; none in a stretch that is not swept.
     fn new<'a>(responses: &Responses, sums_from: impl Fn(usize) -> &'a [i16]) -> Self {
         let (width, height) = (responses.width, responses.height);
         let stride = width + 2 * PEAK_RADIUS;
@@ -115,8 +159,11 @@ impl PeakField {
             let mut left = &mut row[PEAK_RADIUS..][..width];
             while !left.is_empty() {
                 let some = sums_from(at);
-                let (now, later) = left.split_at_mut(some.len().min(left.len()));
-                now.copy_from_slice(&some[..now.len()]);
+                let len = if some.is_empty() { STRETCH - at % STRETCH } else { some.len() };
+                let (now, later) = left.split_at_mut(len.min(left.len()));
+                if !some.is_empty() {
+                    now.copy_from_slice(&some[..now.len()]);
+                }
                 at += now.len();
                 left = later;
             }
@@ -144,19 +191,25 @@ impl PeakField {
     }
 }
 
-/// The best of each place of a chunk, per group.
+/// The best of each place of a stretch, per group; empty if none of its places is swept.
 struct Swept {
     sums: Vec<Vec<i16>>,
     variants: Vec<Vec<u16>>,
 }
 
-/// All variants at the places from `at` on.
+impl Swept {
+    fn sums_from(&self, group: usize, offset: usize) -> &[i16] {
+        self.sums.get(group).map_or(&[], |sums| &sums[offset..])
+    }
+}
+
+/// All variants at the places from `at` on, in the blocks that begin at `blocks`.
 struct SweepStretch<'a> {
     responses: &'a Responses,
     shifts: &'a [Vec<(usize, isize)>],
     groups: &'a Groups,
     at: usize,
-    len: usize,
+    blocks: &'a [usize],
 }
 
 impl WithSimd for SweepStretch<'_> {
@@ -165,14 +218,13 @@ impl WithSimd for SweepStretch<'_> {
     /// Plain loops over blocks that stay in registers; compiled for the widest instructions that the machine has.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Swept {
-        let Self { responses, shifts, groups, at, len } = self;
-        let mut swept = Swept {
-            sums: vec![vec![-1; len.next_multiple_of(BLOCK)]; groups.count],
-            variants: vec![vec![0; len.next_multiple_of(BLOCK)]; groups.count],
-        };
+        let Self { responses, shifts, groups, at, blocks } = self;
+        let num_groups = if blocks.is_empty() { 0 } else { groups.count };
+        let mut swept =
+            Swept { sums: vec![vec![-1; STRETCH]; num_groups], variants: vec![vec![0; STRETCH]; num_groups] };
         // Neighbouring variants read nearly the same bytes; block by block, these bytes stay in the first-level cache.
-        for start in (0..len).step_by(BLOCK) {
-            let from = (at + start) as isize;
+        for &block in blocks {
+            let (start, from) = (block - at, block as isize);
             for (variant_idx, looks) in shifts.iter().enumerate() {
                 let mut sums = [0i16; BLOCK];
                 for some in looks.chunks(READS_PER_BYTE) {
@@ -250,7 +302,7 @@ mod tests {
         let rng = &mut Pcg64Mcg::seed_from_u64(4);
         let (field, bank) = (noise(rng), random_bank(rng));
         let responses = Responses::new(field.level(0), bank.reach);
-        let starts = sweep(&responses, &bank, 1000, 0.0);
+        let starts = sweep(&responses, &bank, None, 1000, 0.0);
         let full = f64::from(FULL) * bank.num_points as f64;
         let groups = Groups::of(&bank);
         assert!(bank.num_scales > 1, "one scale tells no groups apart");

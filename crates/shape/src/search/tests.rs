@@ -44,3 +44,41 @@ fn overlaps_are_what_counting_all_points_gives() {
     }
     assert!(both[0] > 20 && both[1] > 20, "{both:?}");
 }
+
+/// A large picture is swept only where the next coarser level responds, and the same parts are found.
+#[test]
+fn a_screened_picture_shows_the_same_parts() {
+    let (image, outline) = plate();
+    let config = SearchConfig { scales: 0.9..=1.1, ..SearchConfig::DEFAULT };
+    let mut search = ShapeSearch::new(&image, &outline, &config).unwrap();
+    // Plates, some of them halves, among bars of another shape.
+    let large = RgbImage::from_fn(2400, 1800, |x, y| {
+        let (cell, [x, y]) = ([x / 200, y / 160], [x % 200, y % 160]);
+        let is_bar = (60..140).contains(&x) && (70..90).contains(&y);
+        match (cell[0] * 5 + cell[1] * 3) % 17 {
+            0 => *image.get_pixel(x, y),
+            1 if x < 100 => *image.get_pixel(x, y),
+            k if k > 5 && is_bar => Rgb([60; 3]),
+            _ => Rgb([200; 3]),
+        }
+    });
+    let field = GradientField::new(&large);
+    let responses = Responses::new(field.level(search.sweep_level_idx), search.bank.reach);
+    let area = search.screen.as_ref().unwrap().area(&field, &responses, MIN_RESPONSE).unwrap();
+    let share = area.share();
+    assert!((0.02..0.6).contains(&share), "{share} of the places are swept");
+
+    let places = |search: &ShapeSearch| {
+        let found = search.search(&large).into_iter().filter(|found| found.agreement > 0.8);
+        let mut places: Vec<[i64; 2]> = found
+            .map(|found| found.image_from_demonstration.apply(&outline.bounds().center()))
+            .map(|center| [center.x.round() as i64, center.y.round() as i64])
+            .collect();
+        places.sort_unstable();
+        places
+    };
+    let screened = places(&search);
+    search.screen = None;
+    assert_eq!(screened, places(&search));
+    assert!(screened.len() >= 6, "{screened:?}");
+}
