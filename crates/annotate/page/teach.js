@@ -93,15 +93,15 @@ export async function watch() {
   while (isRunning()) {
     await new Promise((resolve) => setTimeout(resolve, POLL_MS));
     try {
-      state.teaching = await api.teaching();
+      const news = await api.teaching();
+      const isDone = news.status === "done";
+      // Nothing is shown between the end of the teaching and its model: results of the model before would be taken for the new one's.
+      const models = isDone ? (await api.session().catch(() => state)).models : state.models;
+      Object.assign(state, { teaching: news, models });
+      if (isDone) searchAgain({ compares: true });
     } catch (error) {
       if (!error.lost) toast(error.message);
     }
-    changed();
-  }
-  if (state.teaching.status === "done") {
-    state.models = (await api.session().catch(() => state)).models;
-    searchAgain({ compares: true });
     changed();
   }
 }

@@ -111,6 +111,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     assert_eq!(region_of_file(&page), Some(ON_IT.map(|side| side as u32)));
     // The page reports the effect of the new model; the effect of another region is not reported as a model's.
     page.click("#tab-try");
+    page.settle_frames();
     let learnt = "return document.getElementById('learnt').innerText.startsWith('The new model finds')";
     patiently(&page, "what was learnt", learnt);
     page.click("#region-set");

@@ -23,6 +23,7 @@ fn a_hand_turned_by_half_a_turn_is_a_change() {
     page.click("#teach-start");
     patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
     page.click("#tab-try");
+    page.settle_frames();
     let learnt = patiently(&page, "the change", LEARNT);
     assert!(learnt.as_str().unwrap().ends_with("In 1 picture the hand is turned: other.png."), "{learnt}");
     let is_warning = "return document.getElementById('learnt').className === 'warning'";
@@ -52,6 +53,7 @@ fn a_hand_turned_by_half_a_turn_is_a_change() {
     page.click("#teach-start");
     patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 3");
     page.click("#tab-try");
+    page.settle_frames();
     let learnt = patiently(&page, "no change", LEARNT);
     assert!(learnt.as_str().unwrap().ends_with("No picture has changed."), "{learnt}");
     // After loading the page again, the symmetry of the model in use is chosen.
