@@ -33,6 +33,9 @@ const MIN_EXPLAINED: f64 = 0.1;
 /// For places seen by a camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned
 /// sets).
 const SLANT_GAIN: f64 = 0.03;
+/// Maximum cost of a slant as a fraction of the level camera's for which it is certain. With three or more places it is
+/// 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
+const UNEXPLAINED: f64 = 0.12;
 /// Minimum score in the rectified picture if nothing is accepted in the picture itself: a slant can also make another
 /// part, mainly a longer one, similar to the photo. Without this minimum, 7 instead of 3 of the tuned sets' 58 pictures
 /// without the part would have a false alarm.
@@ -116,7 +119,14 @@ pub(crate) fn suggested_slant(
         .chain(other)
         .map(|slant| (gain(&slant), slant))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (gain >= SLANT_GAIN).then_some(slant)
+    (gain >= required_gain(shortened.len(), level.0, least_cost)).then_some(slant)
+}
+
+/// The gain of agreement that the best place needs for a slant. Three or more places can determine a slant with
+/// certainty: it has three coordinates, and each place measures two. A gain is not required then, since the best
+/// places are the least shortened ones.
+fn required_gain(num_places: usize, level_cost: f64, least_cost: f64) -> f64 {
+    if num_places >= 3 && least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
 }
 
 /// All tried slants: tilts up to 50° in steps of 2°, directions in steps of 10°.
@@ -251,6 +261,8 @@ const MIN_INSIDE: f64 = 0.6;
 mod tests {
     use super::*;
     use image::Rgb;
+    #[cfg(feature = "teach")]
+    use nalgebra::{Isometry2, Rotation2};
 
     const SIZE: [u32; 2] = [480, 360];
 
@@ -305,44 +317,59 @@ mod tests {
     }
 
     #[cfg(feature = "teach")]
-    #[test]
-    fn a_plate_is_found_under_a_slanted_camera_where_it_is_seen() {
-        use crate::{ModelKind, TeachOptions, Verification, teach};
+    fn plate_model() -> crate::GraspModel {
+        use crate::{ModelKind, TeachOptions, teach};
         use sdg_demonstration::{Annotation, Demonstration};
         use sdg_geometry::GraspLine;
         use std::ops::ControlFlow;
 
-        let level = picture(Some);
-        let (sin, cos) = 0.6f64.sin_cos();
-        let at = |u: f64, v: f64| Point2::from(half(SIZE) + Vector2::new(cos * u - sin * v, sin * u + cos * v));
-        let outline = Polygon { vertices: vec![at(-55.0, -30.0), at(55.0, -30.0), at(55.0, 30.0), at(-55.0, 30.0)] };
+        let on_plate = |u: f64, v: f64| Point2::from(half(SIZE) + Rotation2::new(0.6) * Vector2::new(u, v));
+        let corners = [[-55.0, -30.0], [55.0, -30.0], [55.0, 30.0], [-55.0, 30.0]];
+        let outline = Polygon { vertices: corners.map(|[u, v]| on_plate(u, v)).to_vec() };
         let annotation = Annotation {
             label: "plate".to_owned(),
             bbox: outline.bounds(),
-            grasp: Some(GraspLine::new(at(-20.0, 0.0), at(20.0, 0.0))),
+            grasp: Some(GraspLine::new(on_plate(-20.0, 0.0), on_plate(20.0, 0.0))),
             jaw_width: None,
             outline: Some(outline),
         };
         let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
-        let demonstration = Demonstration { image: level, annotation };
-        let model = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        let demonstration = Demonstration { image: picture(Some), annotation };
+        teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model
+    }
+
+    /// Whether a detection is accepted within `tolerance` pixels and degrees of the plate moved and rotated on the table.
+    #[cfg(feature = "teach")]
+    fn is_plate(detection: &GraspDetection, slant: &Slant, plate: &Isometry2<f64>, tolerance: f64) -> bool {
+        let seen = |u: f64| {
+            let on_plate = Rotation2::new(0.6) * Point2::new(u, 0.0);
+            Point2::from(half(SIZE) + slant.picture_from_level((plate * on_plate).coords).unwrap())
+        };
+        let [from, to] = [-20.0, 20.0].map(seen);
+        let angle = Angle::from_direction(to.x - from.x, to.y - from.y);
+        let off_px = (detection.grasp.center() - seen(0.0)).norm();
+        let off_deg = detection.grasp.angle.distance(angle).to_degrees();
+        detection.is_accepted() && off_px < tolerance && off_deg < tolerance
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
+    fn a_plate_is_found_under_a_slanted_camera_where_it_is_seen() {
+        let model = plate_model();
         for degrees in [0.0, 20.0, 30.0] {
             let slant = slant(degrees);
             let seen = picture(|seen| slant.level_from_picture(seen));
-            let found = model.detect(&seen, Verification::ByShape).unwrap();
-            let best = &found[0];
-            let expected = Point2::from(half(SIZE));
-            let [from, to] = [[-20.0, 0.0], [20.0, 0.0]].map(|[u, v]| {
-                let level = at(u, v).coords - half(SIZE);
-                slant.picture_from_level(level).unwrap()
-            });
-            let angle = Angle::from_direction(to.x - from.x, to.y - from.y);
-            let off_px = (best.grasp.center() - expected).norm();
-            let off_deg = best.grasp.angle.distance(angle).to_degrees();
-            assert!(
-                best.is_accepted() && off_px < 2.0 && off_deg < 2.0,
-                "{degrees}°: {off_px} px, {off_deg}°, {best:?}"
-            );
+            let found = model.detect(&seen, crate::Verification::ByShape).unwrap();
+            assert!(is_plate(&found[0], &slant, &Isometry2::identity(), 2.0), "{degrees}°: {:?}", found[0]);
         }
+    }
+
+    #[test]
+    fn three_places_that_one_slant_explains_need_no_gain() {
+        // As measured for the photographed clips at 20°, and for a level picture without the part.
+        assert!(required_gain(4, 0.711, 0.035) < 0.019);
+        assert!(required_gain(4, 0.265, 0.097) > 0.024);
+        // A slant explains any two places.
+        assert!(required_gain(2, 0.711, 0.001) > 0.024);
     }
 }
