@@ -32,8 +32,6 @@ mod found_text;
 mod interrupt;
 mod json_line;
 mod live_pictures;
-#[cfg(feature = "annotate")]
-mod page_teacher;
 mod paint;
 #[cfg(feature = "simulation")]
 mod parts;
