@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod board_drawing;
 pub mod drawing;
 mod dry_run;
 mod error;
@@ -34,6 +35,7 @@ pub use sdg_demonstration as demonstration;
 pub use sdg_geometry as geometry;
 pub use sdg_grasp as grasp;
 
+pub use board_drawing::draw_board_session;
 pub use drawing::DEFAULT_MIN_SCORE;
 pub use dry_run::DryRun;
 pub use error::{CellError, Result};

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: checked against the photo ─ Demonstration
+//! pictures of a board ─ BoardPicture ─ calibrations ─ CameraUpdate     robot poses ─ robot_poses::views
 //! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Most errors name the file. Not in this crate: command arguments and outputs.
+//! Most errors name the file. Not in this crate: command arguments, texts of results, and outputs except for camera files.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -27,7 +28,9 @@
 
 pub mod annotation_files;
 pub mod base_weights;
+mod board_pictures;
 pub mod camera_files;
+mod camera_update;
 pub mod checkpoints;
 pub mod demonstrations;
 pub mod detector_config;
@@ -37,10 +40,13 @@ pub mod marks_check;
 mod models;
 mod picture_inputs;
 mod pictures;
+pub mod robot_poses;
 mod teaching_files;
 mod workcell_files;
 
 pub use annotation_files::MAX_ANNOTATION_BYTES;
+pub use board_pictures::{BoardPicture, read_board};
+pub use camera_update::CameraUpdate;
 pub use error::ConfigError;
 pub use error_line::one_line;
 pub use models::{check_replaces_a_model, read_model};
