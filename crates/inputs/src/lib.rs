@@ -7,7 +7,8 @@
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Most errors name the file. Not in this crate: command arguments, texts of results, and outputs except for camera files.
+//! Most errors name the file. Not in this crate: command arguments, texts of results, and outputs except for camera files
+//! and converted annotations.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -26,6 +27,7 @@
 #![allow(missing_docs, reason = "the functions have docs; fields are named for what they are")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod annotation_conversion;
 pub mod annotation_files;
 pub mod base_weights;
 mod board_pictures;
@@ -44,10 +46,11 @@ pub mod robot_poses;
 mod teaching_files;
 mod workcell_files;
 
+pub use annotation_conversion::{ConvertedAnnotation, convert_annotation};
 pub use annotation_files::MAX_ANNOTATION_BYTES;
 pub use board_pictures::{BoardPicture, read_board};
 pub use camera_update::CameraUpdate;
-pub use error::ConfigError;
+pub use error::{ConfigError, ImageError, NotAPair};
 pub use error_line::one_line;
 pub use models::{check_replaces_a_model, read_model};
 pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};

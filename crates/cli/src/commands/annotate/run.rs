@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use sdg_annotate::{OpenProject, Server, Session, SessionOptions, Start};
 use sdg_inputs::camera_files::CameraFile;
+use sdg_inputs::demonstrations;
 use sdg_page_session::{PageTeacher, open_chosen, open_session};
 use serde_json::json;
 
 use super::{AnnotateArgs, recent};
-use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::live_pictures;
