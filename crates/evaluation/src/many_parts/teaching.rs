@@ -29,7 +29,8 @@ pub struct PartTeaching<'a> {
 }
 
 impl PartTeaching<'_> {
-    /// Teaches the parts that have no model from these inputs yet. Breaks with the name of the next part if interrupted.
+    /// Teaches the parts that have no model from these inputs yet. If interrupted, breaks with the next
+    /// part's name.
     ///
     /// # Errors
     /// Files cannot be read or written. A part that cannot be taught is an outcome.
