@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use serde_json::{Value, json};
+
 use crate::element::ElementType;
 use crate::error::{Result, WeightsError, printable};
 use crate::pickle::{self, Object, Pickle};
@@ -99,6 +101,23 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
+    /// Format, metadata and the names of all tensors as JSON, as printed by `sdg weights inspect`.
+    pub fn to_json(&self) -> Value {
+        let tensors: Vec<Value> = self
+            .tensors
+            .iter()
+            .map(|(name, tensor)| json!({"name": name, "shape": tensor.shape(), "dtype": tensor.element().name()}))
+            .collect();
+        json!({
+            "format": self.format.to_string(),
+            "author": self.author,
+            "parameters": self.num_parameters(),
+            "metadata": self.metadata,
+            "tensors": tensors,
+            "not_tensors": self.not_tensors,
+        })
+    }
+
     /// Reads names, shapes and positions of all tensors.
     ///
     /// # Errors

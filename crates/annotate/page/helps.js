@@ -9,7 +9,7 @@ import { isFound, isLive, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
-/** Below this score nothing resembles the part. Equal to MIN_ADVISED_SCORE in found_text.rs. */
+/** Below this score nothing resembles the part. Equal to MIN_ADVISED_SCORE in crates/cell/src/words.rs. */
 const MIN_LIKE = 0.03;
 const MAX_CANDIDATES = 3;
 const MAX_OTHERS = 8;

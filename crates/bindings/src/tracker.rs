@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
-use sdg_cell::{Found, FoundRecord, LiveTracker, Perception, SearchTime};
-use sdg_grasp::{TrackState, TrackerConfig};
+use sdg_cell::{Found, FoundRecord, LiveTracker, Perception, SearchTime, track_state_name};
+use sdg_grasp::TrackerConfig;
 use serde::Serialize;
 
 use crate::fault::{Fault, FaultKind, Result};
@@ -68,19 +68,11 @@ impl Tracker {
         self.last_secs = captured_secs;
         let record = |part: sdg_grasp::TrackedPart| Record {
             track: part.id,
-            state: state_name(part.state),
+            state: track_state_name(part.state),
             age_s: part.age.as_secs_f64(),
             found: FoundRecord::new(&Found { detection: part.detection, pose: part.pose }, &self.perception),
         };
         let records: Vec<Record> = parts.into_iter().map(record).collect();
         Ok(serde_json::to_string(&records).unwrap_or_default())
-    }
-}
-
-fn state_name(state: TrackState) -> &'static str {
-    match state {
-        TrackState::Followed => "followed",
-        TrackState::FoundAgain => "found_again",
-        TrackState::Lost => "lost",
     }
 }

@@ -3,6 +3,7 @@
 //! ```text
 //! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its position on the board
 //!   ├─ PictureTaker        a camera's frames        ─ selection of frames as pictures
+//!   ├─ BoardSession        a camera's frames        ─ pictures until nothing is missing, and the view needed next
 //!   ├─ calibrate           many pictures            ─ focal length, centre, lens, with errors and advice
 //!   ├─ locate_sheet        one, on the table        ─ the camera's pose above the table
 //!   └─ calibrate_hand_eye  many, with robot poses   ─ the camera's pose on the robot's hand, or beside the robot
@@ -35,6 +36,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod board;
+mod board_session;
 mod camera_file;
 mod camera_sections;
 mod detection;
@@ -46,10 +48,12 @@ mod intrinsics;
 mod least_squares;
 mod pose;
 mod projection;
+mod records;
 mod table;
 mod taking;
 
 pub use board::{Board, Paper, Sheet};
+pub use board_session::{BoardSession, BoardSight};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
 pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
@@ -57,5 +61,8 @@ pub use guessed::{ASSUMED_VIEW_DEG, FocalSource, bent_px, guess_camera};
 pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, RobotPose, calibrate_hand_eye, read_robot_poses};
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};
-pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};
+pub use records::pose_json;
+pub use table::{
+    FocalCost, FocalEstimate, SheetPlacement, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet,
+};
 pub use taking::{PictureTaker, Sight};

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use image::RgbImage;
 
@@ -28,6 +28,11 @@ impl Frame {
     /// A frame without faults, captured now.
     pub fn new(picture: RgbImage, number: u64, camera: Arc<str>) -> Self {
         Self { picture, number, captured: SystemTime::now(), camera, faults: Vec::new() }
+    }
+
+    /// Capture time in seconds since 1970.
+    pub fn captured_unix_secs(&self) -> f64 {
+        self.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
     }
 }
 

@@ -1,8 +1,8 @@
 //! Plans a grasp from the arm's current posture, with the real sequence and limits, without moving the arm.
 
 use sdg_robot::{
-    ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedArm,
-    Result, Robot, SafetyLimits, Watch,
+    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, KnownTarget, PlaceGoal, PlacingConfig,
+    PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
 };
 
 use crate::sequence_run::{Ended, run_sequence};
@@ -40,5 +40,29 @@ impl DryRun {
         let mut finder = KnownTarget::new(target, camera, config);
         let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, camera, config, place)?;
         Ok(Self { start, opening_m, arm, failed })
+    }
+
+    /// A line for each motion of arm and hand.
+    pub fn lines(&self) -> Vec<String> {
+        let geometry = self.arm.geometry();
+        let in_words = |action: &PlannedAction| match action {
+            PlannedAction::Motion(motion) => {
+                let tcp = geometry.forward(motion.end()).translation.vector * 1e3;
+                let secs = motion.duration_secs();
+                Some(format!("tcp to ({:.0}, {:.0}, {:.0}) mm in {secs:.1} s", tcp.x, tcp.y, tcp.z))
+            }
+            PlannedAction::Wait(_) => None,
+            PlannedAction::Down { end, duration_secs } => {
+                let z_mm = geometry.forward(end).translation.z * 1e3;
+                Some(format!("down softly to about {z_mm:.0} mm, or until contact, in {duration_secs:.1} s"))
+            }
+            PlannedAction::Hand(HandCommand::Move { opening_m, .. }) => {
+                Some(format!("hand open to {:.0} mm", opening_m * 1e3))
+            }
+            PlannedAction::Hand(HandCommand::Grasp { width_m, force_n, .. }) => {
+                Some(format!("hand close on about {:.0} mm with {force_n:.0} N", width_m * 1e3))
+            }
+        };
+        self.arm.actions().iter().filter_map(in_words).collect()
     }
 }

@@ -17,6 +17,15 @@ pub struct Ended {
     pub touched: Vec<Touched>,
 }
 
+impl Ended {
+    /// Whether a picture was taken and did not contain the part. If the first motion was rejected, no picture was
+    /// taken.
+    pub fn found_nothing(&self) -> bool {
+        let is_look = matches!(self.grasp.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
+        is_look && self.grasp.targets.last() == Some(&None)
+    }
+}
+
 /// Grasps the part and, if a place is given, puts it there.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! `sdg`: teach a robot a grasp from one photo.
 //!
 //! ```text
-//! args ─ commands/<command>.rs ─ inputs, cell, evaluation, annotate, ros2-node
+//! args ─ commands/<command>.rs ─ inputs, cell, evaluation, page-session, annotate, ros2-node
 //! ```
 //!
 //! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) the program is
@@ -32,8 +32,6 @@ mod found_text;
 mod interrupt;
 mod json_line;
 mod live_pictures;
-#[cfg(feature = "annotate")]
-mod page_teacher;
 mod paint;
 #[cfg(feature = "simulation")]
 mod parts;

@@ -19,7 +19,7 @@ pub struct Paint(bool);
 
 impl Paint {
     /// No colours.
-    #[cfg(any(feature = "annotate", test))]
+    #[cfg(test)]
     pub const PLAIN: Self = Self(false);
 
     /// For standard output.

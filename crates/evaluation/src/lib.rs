@@ -42,6 +42,8 @@ pub mod rehearsal;
 #[cfg(feature = "simulation")]
 pub mod run_page;
 #[cfg(feature = "simulation")]
+mod run_words;
+#[cfg(feature = "simulation")]
 pub mod shipped;
 #[cfg(feature = "simulation")]
 mod simulated;
@@ -62,6 +64,8 @@ pub use motion_drawing::{draw_dry_run, draw_motions};
 #[cfg(feature = "simulation")]
 pub use own_part::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
 pub use progress::Progress;
+#[cfg(feature = "simulation")]
+pub use run_words::{attempt_in_words, run_json};
 #[cfg(feature = "simulation")]
 pub use simulated::*;
 #[cfg(feature = "simulation")]

@@ -12,7 +12,7 @@ use sdg_grasp::{CameraOverTable, GraspError, GraspModel, Lengths, pictures_from_
 use sdg_robot::workcell::Workcell;
 
 /// Maximum size of a camera file.
-const MAX_BYTES: u64 = 1 << 20;
+pub(crate) const MAX_BYTES: u64 = 1 << 20;
 
 /// A camera file with the camera's pose above the table.
 #[derive(Debug, Clone)]

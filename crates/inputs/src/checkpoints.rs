@@ -1,5 +1,6 @@
 //! Detectors from checkpoints: which detector a file is for, and whether its outputs equal the original's.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -8,10 +9,11 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::golden::{self, GoldenReport};
 use sdg_grasp::Device;
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
-use sdg_weights_conversion::{Checkpoint, Conversion, Naming, naming_of};
+use sdg_weights_conversion::architecture::{Architecture, Backbone};
+use sdg_weights_conversion::{Checkpoint, Conversion, Naming, is_backbone_alone, naming_of};
 
 use crate::base_weights::open;
-use crate::detector_config::{architecture_of, preset, preset_for};
+use crate::detector_config::{architecture_of, preset, preset_for, read_config};
 
 /// The detector of a checkpoint: given by a configuration or a preset's name, stated in the file, or derived from the
 /// parameters' names.
@@ -29,6 +31,29 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
         (None, Some(name)) => preset(name, checkpoint),
         (None, None) => preset(preset_for(naming)?, checkpoint),
     }
+}
+
+/// The network to fill with a checkpoint, and the metadata that identify it. The detector is found as by [`config_of`];
+/// a checkpoint of a backbone alone needs none.
+///
+/// # Errors
+/// The errors of [`config_of`]; or the configuration cannot be read.
+pub fn conversion_target(
+    checkpoint: &Checkpoint,
+    config: Option<&Path>,
+    preset: Option<&str>,
+) -> Result<(Architecture, BTreeMap<String, String>)> {
+    let naming = naming_of(checkpoint)?;
+    if is_backbone_alone(checkpoint, naming) && preset.is_none() && config.is_none() {
+        let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
+        return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
+    }
+    let config = config_of(checkpoint, config.map(read_config).transpose()?, preset)?;
+    let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
+    if let Some(preset) = preset {
+        metadata.insert("preset".to_owned(), preset.to_owned());
+    }
+    Ok((architecture_of(&config), metadata))
 }
 
 /// Builds the detector of a checkpoint, loads the weights, and compares it stage by stage with the original's outputs

@@ -1,13 +1,13 @@
 //! The two files of a demonstration: a photo and its marks.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use sdg_demonstration::Demonstration;
 
+use crate::annotation_files::{AnnotationFile, beside_photo};
+use crate::error::NotAPair;
 use crate::pictures::read_image;
-
-use crate::annotation_files::AnnotationFile;
 
 /// Reads a photo and its marks.
 ///
@@ -33,4 +33,57 @@ pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstrat
         );
     }
     Ok(Demonstration { image, annotation: objects.remove(0) })
+}
+
+/// The photo and the annotation file of `IMAGE:ANNOTATION`, or of `IMAGE` with the annotation beside it.
+///
+/// # Errors
+/// The photo does not exist or has no marks beside it; [`NotAPair`] for a malformed text.
+pub fn photo_and_marks(text: &str) -> Result<(PathBuf, PathBuf)> {
+    let photo = Path::new(text);
+    if text.contains(':') && !photo.exists() {
+        return Ok(split(text)?);
+    }
+    if text.is_empty() {
+        return Err(NotAPair { found: "nothing".to_owned() }.into());
+    }
+    // Checked first, so that a missing photo is not reported as a photo without marks.
+    sdg_files::check_readable(photo)?;
+    Ok((photo.to_owned(), beside_photo(photo)?))
+}
+
+/// Splits `IMAGE:ANNOTATION` at a colon. Paths may contain colons as well: of several colons, the one between two
+/// existing files is used.
+///
+/// # Errors
+/// There is no colon between two names.
+pub fn split(text: &str) -> std::result::Result<(PathBuf, PathBuf), NotAPair> {
+    let splits: Vec<(PathBuf, PathBuf)> = text
+        .match_indices(':')
+        .map(|(at, _)| (text[..at].into(), text[at + 1..].into()))
+        .filter(|(image, annotation): &(PathBuf, PathBuf)| {
+            !image.as_os_str().is_empty() && !annotation.as_os_str().is_empty()
+        })
+        .collect();
+    let exist = |(image, annotation): &&(PathBuf, PathBuf)| Path::exists(image) && Path::exists(annotation);
+    let best = splits.iter().find(exist).or(splits.last());
+    best.cloned().ok_or_else(|| NotAPair { found: format!("\"{text}\"") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error_line::one_line;
+
+    #[test]
+    fn splits_at_the_colon() {
+        assert_eq!(split("a.png:b.json").unwrap(), ("a.png".into(), "b.json".into()));
+        assert_eq!(split("C:/a.png:b.json").unwrap(), ("C:/a.png".into(), "b.json".into()));
+    }
+
+    #[test]
+    fn a_photo_that_is_not_there_is_told_as_that() {
+        let error = photo_and_marks("/nowhere/photo.png").unwrap_err();
+        assert!(one_line(&error).starts_with("/nowhere/photo.png: cannot read: No such file"));
+    }
 }

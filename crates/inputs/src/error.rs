@@ -1,5 +1,7 @@
 //! Errors that the caller can complete, for example with the name of an option.
 
+use std::path::PathBuf;
+
 use thiserror::Error;
 
 /// The reason why the detector of a checkpoint is unknown.
@@ -16,4 +18,25 @@ pub enum ConfigError {
     /// No preset has this second stage.
     #[error("expected a keypoint head or a mask head, found both")]
     BothHeads,
+}
+
+/// A text that does not name a photo and its marks.
+#[derive(Debug, Error)]
+#[error("expected IMAGE or IMAGE:ANNOTATION, found {found}")]
+#[allow(missing_docs, reason = "the message says what the field is")]
+pub struct NotAPair {
+    pub found: String,
+}
+
+/// The reason why the image of an annotation file must be given.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum ImageError {
+    /// The file does not state a size.
+    #[error("{} does not state the size of its image; expected the image", path.display())]
+    NoSize { path: PathBuf },
+    /// The file has several images.
+    #[error("expected one of the {count} images of {}", path.display())]
+    Several { count: usize, path: PathBuf },
 }

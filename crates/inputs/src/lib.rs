@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: checked against the photo ─ Demonstration
+//! pictures of a board ─ BoardPicture ─ calibrations ─ CameraUpdate     robot poses ─ robot_poses::views
 //! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
-//! Most errors name the file. Not in this crate: command arguments and outputs.
+//! Most errors name the file. Not in this crate: command arguments, texts of results, and outputs except for camera files
+//! and converted annotations.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -25,9 +27,12 @@
 #![allow(missing_docs, reason = "the functions have docs; fields are named for what they are")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod annotation_conversion;
 pub mod annotation_files;
 pub mod base_weights;
+mod board_pictures;
 pub mod camera_files;
+mod camera_update;
 pub mod checkpoints;
 pub mod demonstrations;
 pub mod detector_config;
@@ -37,11 +42,15 @@ pub mod marks_check;
 mod models;
 mod picture_inputs;
 mod pictures;
+pub mod robot_poses;
 mod teaching_files;
 mod workcell_files;
 
+pub use annotation_conversion::{ConvertedAnnotation, convert_annotation};
 pub use annotation_files::MAX_ANNOTATION_BYTES;
-pub use error::ConfigError;
+pub use board_pictures::{BoardPicture, read_board};
+pub use camera_update::CameraUpdate;
+pub use error::{ConfigError, ImageError, NotAPair};
 pub use error_line::one_line;
 pub use models::{check_replaces_a_model, read_model};
 pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};

@@ -64,6 +64,11 @@ pub struct HandEye {
 }
 
 impl HandEye {
+    /// The largest changes in [`Self::spread`]: metres and radians.
+    pub fn max_spread(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.spread.iter().map(|spread| spread[k]).fold(0.0, f64::max))
+    }
+
     /// The camera with its pose, on the hand or above the table. `table_height_m` is the table's z in the base frame,
     /// used for [`Mount::Base`]. `None` keeps the height in `camera` if its `table` is in the base frame; otherwise the
     /// height is 0.

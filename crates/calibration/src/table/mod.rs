@@ -8,7 +8,9 @@
 //! states how much.
 
 mod focal;
+mod placement;
 mod sheet_pose;
 
 pub use self::focal::{FocalCost, FocalEstimate, focal_cost, focal_from_sheet, homography_rms_px};
+pub use self::placement::SheetPlacement;
 pub use self::sheet_pose::{SheetPose, locate_sheet};

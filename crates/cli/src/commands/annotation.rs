@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
-use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts};
-use sdg_inputs::annotation_files::{AnnotationFile, write_data_yaml};
+use sdg_demonstration::AnnotationFormat;
+use sdg_inputs::{ConvertedAnnotation, ImageError, convert_annotation};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
@@ -59,36 +59,33 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     if sdg_files::is_same_file(&args.input, &args.output) {
         return Err(Usage(format!("{}: expected an output file other than the input", args.output.display())).into());
     }
-    sdg_files::check_writable(&args.output)?;
-    let input = AnnotationFile::read(&args.input)?;
-    let (width, height, file_name, objects) = read_marks(args, &input)?;
-    let image = ImageFacts { width, height, file_name: file_name.as_deref() };
-    let written = format.write(&image, &objects)?;
-
-    let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
-    sdg_files::write(&args.output, written.text.as_bytes())?;
-    for left_out in &written.left_out {
+    let converted = convert_annotation(&args.input, args.image.as_deref(), &args.output, format);
+    let ConvertedAnnotation { input_format, image, labels, left_out, data_yaml } =
+        converted.map_err(|error| match error.downcast_ref() {
+            Some(ImageError::NoSize { .. } | ImageError::Several { .. }) => Usage(format!("--image: {error}")).into(),
+            _ => error,
+        })?;
+    for left_out in &left_out {
         eprintln!("left out: {left_out}");
     }
     if args.json {
         let line = json!({
             "in": args.input.display().to_string(),
-            "in_format": input.format.name(),
+            "in_format": input_format.name(),
             "out": args.output.display().to_string(),
             "out_format": format.name(),
             "data_yaml": data_yaml.map(|path| path.display().to_string()),
-            "image": {"file_name": file_name, "width": width, "height": height},
-            "objects": objects.iter().map(|object| &object.label).collect::<Vec<_>>(),
-            "left_out": written.left_out,
+            "image": {"file_name": image.file_name, "width": image.width, "height": image.height},
+            "objects": labels,
+            "left_out": left_out,
         });
         println!("{line}");
     } else {
-        let labels: Vec<_> = objects.iter().map(|object| object.label.as_str()).collect();
         println!(
             "wrote {} ({} from {}): {}",
             args.output.display(),
             format.name(),
-            input.format.name(),
+            input_format.name(),
             labels.join(", ")
         );
         if let Some(path) = data_yaml {
@@ -115,39 +112,5 @@ fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
             ))
             .into()),
         },
-    }
-}
-
-/// Reads the marks and the size and name of their image: from the image itself if it is given, otherwise from the
-/// file's only entry.
-fn read_marks(
-    args: &ConvertAnnotationArgs,
-    input: &AnnotationFile,
-) -> Result<(u32, u32, Option<String>, Vec<Annotation>)> {
-    if let Some(path) = &args.image {
-        let image = sdg_inputs::read_image(path)?;
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-        return Ok((image.width(), image.height(), name, input.objects_on(path, &image)?));
-    }
-    let DeclaredImage { file_name, width, height } = declared_image(args, input)?;
-    let objects = input.objects(&ImageFacts { width, height, file_name: file_name.as_deref() })?;
-    input.report_skipped();
-    Ok((width, height, file_name, objects))
-}
-
-/// The file's entry for its only image.
-fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Result<DeclaredImage> {
-    let mut declared =
-        AnnotationFormat::declared_images(input.bytes()).with_context(|| args.input.display().to_string())?;
-    match declared.len() {
-        1 => Ok(declared.remove(0)),
-        0 => Err(Usage(format!(
-            "--image: {} does not state the size of its image; expected the image",
-            args.input.display()
-        ))
-        .into()),
-        several => {
-            Err(Usage(format!("--image: expected one of the {several} images of {}", args.input.display())).into())
-        }
     }
 }

@@ -1,14 +1,13 @@
 //! `sdg teach --demos DIR`: teaches many parts, compares them with each other, and writes one page.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use image::RgbImage;
 use sdg_evaluation::Progress;
 use sdg_evaluation::many_parts::{
-    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page, teach_part,
+    DemonstrationFolder, PartDemonstrations, PartOutcome, PartOutcomes, PartStore, PartTeaching, page,
 };
-use sdg_grasp::TeachOptions;
 use sdg_weights_conversion::sha256_of;
 use serde_json::{Value, json};
 
@@ -22,7 +21,6 @@ use crate::progress::EvaluationProgress;
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
     read_base_weights(args, &mut options)?;
-    let options = &options;
     let weights_sha256 = args.base_weights.as_deref().map(sha256_of).transpose()?;
     let demonstrations = DemonstrationFolder::read(folder, symmetry)?;
     let asked = asked_for(args, &demonstrations.parts)?;
@@ -30,36 +28,22 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let (interrupt, progress) = (Interrupt::watch(), EvaluationProgress::new());
     let checks = if args.parts.is_empty() { asked.len() } else { 0 };
     progress.expect(asked.len() + checks);
-    let mut outcomes = Vec::with_capacity(asked.len());
-    for part in &asked {
-        let key = key(args, part, options, weights_sha256.as_deref())?;
-        let outcome = match store.read(&part.name, &key)? {
-            Some(outcome) => outcome,
-            None => {
-                let Some((model, outcome)) = teach_part(part, options, &|| interrupt.is_requested()) else {
-                    bail!("interrupted: run the same command again to continue with {}", part.name);
-                };
-                store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
-                outcome
-            }
-        };
-        progress.unit_done(&format!("teach {}: {}", part.name, outcome.in_words()));
-        outcomes.push((part.name.clone(), outcome));
-    }
+    let teaching = PartTeaching {
+        store: &store,
+        options: &options,
+        weights_sha256: weights_sha256.as_deref(),
+        reinitialized: &args.reinitialized,
+    };
+    let outcomes = match teaching.run(&asked, &|| interrupt.is_requested(), &progress)? {
+        ControlFlow::Continue(outcomes) => outcomes,
+        ControlFlow::Break(next) => bail!("interrupted: run the same command again to continue with {next}"),
+    };
     if checks == 0 {
         progress.finish();
         return told(args, outcomes);
     }
-    let is_taught = |name: &str| {
-        outcomes.iter().any(|(known, outcome)| known == name && matches!(outcome, PartOutcome::Taught { .. }))
-    };
-    let taught: Vec<&&PartDemonstrations> = asked.iter().filter(|part| is_taught(&part.name)).collect();
-    let names: Vec<&str> = taught.iter().map(|part| part.name.as_str()).collect();
-    let photos: Vec<RgbImage> = taught.iter().map(|part| part.first_photo()).collect::<Result<_>>()?;
-    let done = |name: &str| progress.unit_done(&format!("{name}: run on {} photos", photos.len()));
-    let check = CrossCheck::run(&store, &names, &photos, &done)?;
+    let (findings, photos) = teaching.check(&asked, outcomes, demonstrations.left_out, &progress)?;
     progress.finish();
-    let findings = Findings::new(outcomes, check, demonstrations.left_out);
     let report = page(&findings, &photos, &command(args, folder)).write(args.report.as_ref().unwrap_or(&args.out))?;
     if args.json {
         let mut line = findings.to_json();
@@ -94,31 +78,8 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// The inputs that a part's model depends on.
-fn key(
-    args: &TeachArgs,
-    part: &PartDemonstrations,
-    options: &TeachOptions,
-    weights_sha256: Option<&str>,
-) -> Result<Value> {
-    let symmetry = part.symmetry.unwrap_or(options.symmetry);
-    Ok(json!({
-        "files": part.sha256()?,
-        "model": options.kind,
-        "preset": options.preset.name(),
-        "seed": args.seed,
-        "steps": args.steps,
-        "time_budget": args.time_budget,
-        "symmetry": symmetry,
-        "size_tolerance": [args.size_tolerance.low, args.size_tolerance.high],
-        "base_weights_sha256": weights_sha256,
-        "reinit": args.reinitialized,
-        "version": env!("CARGO_PKG_VERSION"),
-    }))
-}
-
 /// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`.
-fn told(args: &TeachArgs, outcomes: Vec<(String, PartOutcome)>) -> Result<Outcome> {
+fn told(args: &TeachArgs, outcomes: PartOutcomes) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =
             outcomes.iter().map(|(name, outcome)| json!({ "name": name, "outcome": outcome })).collect();

@@ -1,6 +1,5 @@
 //! `sdg weights`: Detectron2 and torchvision checkpoints.
 
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -8,11 +7,9 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use sdg_inputs::ConfigError;
 use sdg_inputs::base_weights::open;
-use sdg_inputs::checkpoints::{config_of, verify_checkpoint};
-use sdg_inputs::detector_config::{architecture_of, read_config};
-use sdg_weights_conversion::architecture::Backbone;
-use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Precision};
-use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
+use sdg_inputs::checkpoints::{conversion_target, verify_checkpoint};
+use sdg_inputs::detector_config::read_config;
+use sdg_weights_conversion::{Conversion, Precision, naming_of, sha256_of};
 use serde_json::json;
 
 use crate::clock;
@@ -120,27 +117,12 @@ fn in_options(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// The network to fill, and the metadata that identify it.
-fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, BTreeMap<String, String>)> {
-    let naming = naming_of(checkpoint)?;
-    if is_backbone_alone(checkpoint, naming) && args.preset.is_none() && args.config.is_none() {
-        let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
-        return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
-    }
-    let config = args.config.as_deref().map(read_config).transpose()?;
-    let config = config_of(checkpoint, config, args.preset.as_deref()).map_err(in_options)?;
-    let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
-    if let Some(preset) = &args.preset {
-        metadata.insert("preset".to_owned(), preset.clone());
-    }
-    Ok((architecture_of(&config), metadata))
-}
-
 /// Prints the whole report first, even if tensors are missing, and then writes the file unless there is an error.
 fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
-    let (architecture, metadata) = target(args, &checkpoint).with_context(named)?;
+    let target = conversion_target(&checkpoint, args.config.as_deref(), args.preset.as_deref());
+    let (architecture, metadata) = target.map_err(in_options).with_context(named)?;
     let conversion = Conversion::plan(&checkpoint, &architecture, &args.reinitialized).with_context(named)?;
     let precision = if args.f16 { Precision::F16 } else { Precision::F32 };
     let paths = [args.input.as_path(), args.output.as_path()];
@@ -188,23 +170,11 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
     let types: Vec<_> = checkpoint.element_types().iter().map(|(e, count)| format!("{count} {}", e.name())).collect();
     let mut stdout = std::io::stdout().lock();
     if args.json {
-        let tensors: Vec<_> = checkpoint
-            .tensors
-            .iter()
-            .map(|(name, tensor)| json!({"name": name, "shape": tensor.shape(), "dtype": tensor.element().name()}))
-            .collect();
-        let line = json!({
-            "file": args.file.display().to_string(),
-            "format": checkpoint.format.to_string(),
-            "naming": naming,
-            "author": checkpoint.author,
-            "bytes": source.len(),
-            "sha256": sha256,
-            "parameters": checkpoint.num_parameters(),
-            "metadata": checkpoint.metadata,
-            "tensors": tensors,
-            "not_tensors": checkpoint.not_tensors,
-        });
+        let mut line = checkpoint.to_json();
+        line["file"] = json!(args.file.display().to_string());
+        line["naming"] = json!(naming);
+        line["bytes"] = json!(source.len());
+        line["sha256"] = json!(sha256);
         writeln!(stdout, "{line}")?;
         return Ok(Outcome::Done);
     }

@@ -2,33 +2,14 @@
 
 use anyhow::{Result, anyhow};
 use sdg_cell::DryRun;
-use sdg_robot::{Arm, PlannedAction};
 
 /// Prints one line for each motion, and the end of the plan.
 ///
 /// # Errors
 /// A step cannot be planned.
 pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
-    let geometry = plan.arm.geometry();
-    for action in plan.arm.actions() {
-        match action {
-            PlannedAction::Motion(motion) => {
-                let tcp = geometry.forward(motion.end()).translation.vector * 1e3;
-                let secs = motion.duration_secs();
-                eprintln!("  tcp to ({:.0}, {:.0}, {:.0}) mm in {secs:.1} s", tcp.x, tcp.y, tcp.z);
-            }
-            PlannedAction::Wait(_) => {}
-            PlannedAction::Down { end, duration_secs } => {
-                let z_mm = geometry.forward(end).translation.z * 1e3;
-                eprintln!("  down softly to about {z_mm:.0} mm, or until contact, in {duration_secs:.1} s");
-            }
-            PlannedAction::Hand(sdg_robot::HandCommand::Move { opening_m, .. }) => {
-                eprintln!("  hand open to {:.0} mm", opening_m * 1e3);
-            }
-            PlannedAction::Hand(sdg_robot::HandCommand::Grasp { width_m, force_n, .. }) => {
-                eprintln!("  hand close on about {:.0} mm with {force_n:.0} N", width_m * 1e3);
-            }
-        }
+    for line in plan.lines() {
+        eprintln!("  {line}");
     }
     match &plan.failed {
         None => eprintln!("  {:.0} s in all", plan.arm.duration_secs()),

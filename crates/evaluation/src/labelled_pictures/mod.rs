@@ -20,6 +20,7 @@ mod records;
 mod score;
 mod summary;
 mod taught;
+mod testing;
 mod truth_file;
 
 pub use folder::LabelledFolder;
@@ -30,4 +31,5 @@ pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
 pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
 pub use sdg_cell::DEFAULT_MIN_SCORE;
 pub use summary::summary;
+pub use testing::TestedFolder;
 pub use truth_file::{TRUTH_FILE, TruthEntry};

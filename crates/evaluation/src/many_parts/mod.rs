@@ -2,8 +2,8 @@
 //! are one page.
 //!
 //! ```text
-//! DemonstrationFolder ─ PartDemonstrations ─ teach ─ PartStore ─┬─ CrossCheck: each model on every part's photo
-//!                                                               └─ findings: parts that look alike or need another photo ─ page
+//! DemonstrationFolder ─ PartDemonstrations ─ PartTeaching ─ PartStore ─┬─ CrossCheck: each model on every part's photo
+//!                                                                      └─ findings: parts that look alike or need another photo ─ page
 //! OUT/models/NAME.sdg   OUT/parts/NAME.json   OUT/index.html
 //! ```
 //!
@@ -16,6 +16,7 @@ mod folder;
 mod page;
 mod part_store;
 mod teach;
+mod teaching;
 
 pub use cross_check::CrossCheck;
 pub use findings::Findings;
@@ -23,3 +24,4 @@ pub use folder::{DemonstrationFolder, PartDemonstrations};
 pub use page::page;
 pub use part_store::{PartOutcome, PartRecord, PartStore};
 pub use teach::teach_part;
+pub use teaching::{PartOutcomes, PartTeaching};

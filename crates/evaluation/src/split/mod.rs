@@ -14,12 +14,14 @@
 mod candidates;
 mod counts;
 mod file;
+mod measuring;
 mod run;
 mod summary;
 mod tables;
 
 pub use candidates::candidates;
 pub use file::{Side, SplitSet, read_split};
+pub use measuring::{measure, results_json, sides_of};
 pub use run::{Measured, ReadySet};
 pub use summary::summary;
 pub use tables::tables;

@@ -1,38 +1,19 @@
 //! `sdg annotate`: the annotation page.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use anyhow::{Result, anyhow};
-use nalgebra::Point2;
-use sdg_annotate::{CameraPictures, LiveOptions, OpenProject, Server, Session, SessionOptions, SizeCheck, Start};
-use sdg_camera::{Address, OpenOptions, PixelFrame};
-use sdg_files::{FileError, WriterLock};
-use sdg_grasp::Preset;
-use sdg_inputs::UNREADABLE_EXTENSIONS;
+use anyhow::Result;
+use sdg_annotate::{OpenProject, Server, Session, SessionOptions, Start};
 use sdg_inputs::camera_files::CameraFile;
-use sdg_kinematics::HAND_OPENING_MAX_M;
+use sdg_inputs::demonstrations;
+use sdg_page_session::{PageTeacher, open_chosen, open_session};
 use serde_json::json;
 
 use super::{AnnotateArgs, recent};
-use crate::demonstrations;
-use crate::exit::{Outcome, Usage, one_line};
+use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::live_pictures;
-use crate::page_teacher::PageTeacher;
 use crate::web_browser;
-
-/// Locks a file of marks against other processes; `None` if the folder is not writable.
-fn lock(written: &Path) -> Result<Option<WriterLock>> {
-    WriterLock::take(written).map_err(|error| match error {
-        FileError::Held { path, holder } => anyhow!(
-            "{}: another `sdg annotate` ({holder}) is editing these marks; continue on its page, or stop it first",
-            path.display()
-        ),
-        error => error.into(),
-    })
-}
 
 /// Serves the page until Ctrl-C.
 pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
@@ -41,7 +22,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     }
     let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
     let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
-    let camera = camera.map(|camera| (camera, args.camera.heights_m()));
+    let teacher = PageTeacher { preset, camera: camera.map(|camera| (camera, args.camera.heights_m())) };
     let token = args.token_file.as_deref().map(sdg_annotate::token_of_file).transpose()?;
     let server = if args.images.is_empty() && args.from.is_none() {
         if args.out.is_some() || !args.trial_pictures.is_empty() {
@@ -50,11 +31,11 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             )
             .into());
         }
-        let start = Start { recent: recent::projects(), folder: PathBuf::new(), open: opener(preset, camera) };
+        let start = Start { recent: recent::projects(), folder: PathBuf::new(), open: opener(teacher) };
         Server::bind_start(start, args.port, token.as_deref())?
     } else {
         let project = project(&args.images)?;
-        let session = open(args, project, preset, camera, token)?;
+        let session = open(args, project, &teacher, token)?;
         Server::bind(session, args.port)?
     };
     let url = server.url();
@@ -76,8 +57,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
 fn open(
     args: &AnnotateArgs,
     project: Option<PathBuf>,
-    preset: Preset,
-    camera: Option<(CameraFile, [f64; 2])>,
+    teacher: &PageTeacher,
     token: Option<String>,
 ) -> Result<Session> {
     let arguments = args.images.iter().filter(|_| project.is_none());
@@ -87,103 +67,36 @@ fn open(
         (Some(_), Some(folder)) => Some(folder.join("photo.png")),
         (Some(_), None) => Some(photo_path(&mut images)?),
     };
-    // Checked here, so that the error does not come after minutes of marking.
-    for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
-        sdg_files::check_writable(&written.with_extension("json"))?;
-    }
-    if let Some(out) = &args.out {
-        sdg_files::check_writable(out)?;
-    }
-    let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
-    let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
-    let project_file = match (&project, images.first()) {
-        (Some(folder), _) => Some(folder.join("sdg-project.json")),
-        (None, Some((photo, _))) => Some(sdg_annotate::project_of_photo(photo)?),
-        (None, None) => None,
-    };
-    let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
-    let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
-    for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
-        for path in sdg_files::entries(folder)? {
-            // Other files beside the pictures are expected and not reported, but unreadable pictures are.
-            if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
-                let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
-                eprintln!("left out: {why}");
-            }
-        }
-    }
-    if camera.is_some() {
-        let photos = images.iter().map(|(photo, _)| photo).filter(|photo| photo.exists());
-        photos.into_iter().try_for_each(|photo| sdg_inputs::check_is_not_turned(photo))?;
-    }
-    let calibration = camera.as_ref().map(|(file, _)| file.clone());
-    let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
-    let live = args.from.clone().zip(photo_path).map(open).transpose()?;
     let opened = project.clone().or_else(|| images.first().map(|(photo, _)| photo.clone()));
     let options = SessionOptions {
         images,
         trial_pictures: args.trial_pictures.clone(),
         model_path: args.out.clone(),
-        live,
         project,
         token,
-        max_opening_px: camera.as_ref().and_then(max_opening_px),
+        ..SessionOptions::default()
     };
-    let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
+    let open_camera = || {
+        let Some((from, photo_path)) = args.from.clone().zip(photo_path.clone()) else { return Ok(None) };
+        let address = sdg_annotate::paced(from);
+        let camera = live_pictures::open(&address, &teacher.open_options(args.request.options()))?;
+        Ok(Some(teacher.live(camera, &address, photo_path)))
+    };
+    let report = &mut |line: &str| eprintln!("{line}");
+    let session = open_session(teacher, options, photo_path.as_deref(), open_camera, report)?;
     if let Some(opened) = opened {
         recent::note(&opened);
     }
-    Ok(session.holding(locks.into_iter().flatten().collect()))
+    Ok(session)
 }
 
 /// Opens the project chosen on the page: a folder or a photo.
-fn opener(preset: Preset, camera: Option<(CameraFile, [f64; 2])>) -> OpenProject {
+fn opener(teacher: PageTeacher) -> OpenProject {
     Box::new(move |path| {
-        let is_folder = path.is_dir();
-        let written = if is_folder { path.join("sdg-project.json") } else { sdg_annotate::project_of_photo(path)? };
-        sdg_files::check_writable(&written)?;
-        let marks = (!is_folder).then(|| path.with_extension("json"));
-        let locks = marks.into_iter().chain([written]).map(|written| lock(&written)).collect::<Result<Vec<_>>>()?;
-        let options = SessionOptions {
-            images: if is_folder { Vec::new() } else { vec![(path.to_owned(), None)] },
-            project: is_folder.then(|| path.to_owned()),
-            max_opening_px: camera.as_ref().and_then(max_opening_px),
-            ..SessionOptions::default()
-        };
-        let session = Session::open(&options, Arc::new(PageTeacher { preset, camera: camera.clone() }))?;
+        let session = open_chosen(&teacher, path)?;
         recent::note(path);
-        Ok(session.holding(locks.into_iter().flatten().collect()))
+        Ok(session)
     })
-}
-
-/// The hand's maximum opening, in pixels at the centre of the photo, in the plane of the marks. It is nearly constant
-/// over a table that is seen from above.
-fn max_opening_px((file, [mark_height_m, _]): &(CameraFile, [f64; 2])) -> Option<f64> {
-    let [width, height] = file.size_px();
-    let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
-    let over_table = &file.over_table;
-    let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
-    Some(HAND_OPENING_MAX_M / scale)
-}
-
-/// Opens the camera. With a calibration, the size in it is requested, and frames of another size are a fault.
-fn open_camera(
-    from: Address,
-    mut options: OpenOptions,
-    calibration: Option<CameraFile>,
-    photo_path: PathBuf,
-) -> Result<LiveOptions> {
-    if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
-        (options.width, options.height) = (width, height);
-        options.frame = PixelFrame::Sensor;
-    }
-    let address = sdg_annotate::paced(from);
-    let camera = live_pictures::open(&address, &options)?;
-    let check = calibration.map(|camera| -> Box<SizeCheck> {
-        Box::new(move |size| camera.check_size(size).map_err(|error| one_line(&error)))
-    });
-    let pictures = Arc::new(CameraPictures::read(camera, matches!(address, Address::Sim(_)), check));
-    Ok(LiveOptions { pictures, address: address.to_string(), photo_path })
 }
 
 /// The project's folder, if the arguments are one folder.

@@ -2,17 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
-use image::{GrayImage, RgbImage};
-use nalgebra::Isometry3;
-use sdg_calibration::{Board, Sheet};
-use serde_json::{Value, json};
+use sdg_calibration::Board;
 
 use crate::exit::Usage;
-
-/// Maximum size of a board file; `sdg camera board` writes smaller ones.
-const MAX_BYTES: u64 = 4 << 20;
 
 /// The board in the pictures.
 #[derive(Debug, Args)]
@@ -40,10 +34,7 @@ impl BoardInUse {
     /// The board with its printed size.
     pub fn read(&self) -> Result<Board> {
         let drawn = match &self.board {
-            Some(path) => {
-                let bytes = sdg_files::read(path, MAX_BYTES)?;
-                Sheet::board_of(&String::from_utf8_lossy(&bytes)).with_context(|| path.display().to_string())?
-            }
+            Some(path) => sdg_inputs::read_board(path)?,
             None => {
                 let [columns, rows] = self.squares;
                 Board::new(columns, rows, self.square_mm / 1000.0).map_err(|error| Usage(error.to_string()))?
@@ -57,18 +48,6 @@ impl BoardInUse {
 pub fn squares(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
     sides.ok_or_else(|| format!("expected squares horizontally and vertically, such as 9x6, found {text}"))
-}
-
-/// The picture in greyscale, as board detection needs it.
-pub fn grey(picture: &RgbImage) -> GrayImage {
-    image::imageops::grayscale(picture)
-}
-
-/// A pose in the format of camera files and `--json`.
-pub fn pose_json(pose: &Isometry3<f64>) -> Value {
-    let translation: [f64; 3] = pose.translation.vector.into();
-    let rotation: [f64; 4] = pose.rotation.coords.into();
-    json!({"translation_m": translation, "rotation_xyzw": rotation})
 }
 
 /// A path as shown in messages.

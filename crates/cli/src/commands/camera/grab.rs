@@ -2,7 +2,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -84,7 +84,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {
-    let unix_secs = frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+    let unix_secs = frame.captured_unix_secs();
     let (width, height) = frame.picture.dimensions();
     let mut stdout = std::io::stdout().lock();
     if is_json {

@@ -3,19 +3,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use clap::{Args, ValueEnum};
-use rayon::prelude::*;
-use sdg_calibration::{
-    Board, CalibratedCamera, CalibrationError, HandEye, HandEyeView, RobotPose, calibrate_hand_eye, find_board,
-    read_robot_poses,
-};
-use sdg_demonstration::PixelFrame;
+use sdg_calibration::{CalibratedCamera, CalibrationError, HandEye, RobotPose, calibrate_hand_eye};
 use sdg_geometry::{Mount, upper_median};
-use sdg_inputs::camera_files;
+use sdg_inputs::{camera_files, robot_poses};
 use serde_json::{Value, json};
 
-use super::board_in_use::{BoardInUse, grey, named, pose_json};
+use super::board_in_use::{BoardInUse, named};
 use crate::exit::{Outcome, one_line};
 
 /// `sdg camera hand-eye`
@@ -59,8 +54,6 @@ impl From<MountName> for Mount {
     }
 }
 
-/// Maximum size of a poses file.
-const MAX_BYTES: u64 = 4 << 20;
 /// Ratio of a picture's error to the median error above which the picture is reported.
 const MAX_RMS_RATIO: f64 = 3.0;
 
@@ -69,18 +62,14 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let mount = Mount::from(args.mount);
     let (camera, existing) = camera_files::read(&args.camera)?;
-    let bytes = sdg_files::read(&args.poses, MAX_BYTES)?;
-    let poses =
-        read_robot_poses(&named(&args.poses), &String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
+    let poses = robot_poses::read(&args.poses)?;
     if let Some(out) = &args.out {
         sdg_files::check_extendable(out, Some(&args.camera))?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
-    check_pictures_exist(&poses, folder)?;
-    let looked: Vec<(&RobotPose, Result<HandEyeView>)> =
-        poses.par_iter().map(|pose| (pose, look(pose, folder, &camera, &board))).collect();
+    robot_poses::check_pictures_exist(&poses, folder)?;
     let (mut lines, mut seen, mut views) = (Vec::new(), Vec::new(), Vec::new());
-    for (pose, result) in looked {
+    for (pose, result) in robot_poses::views(&poses, folder, &camera, &board) {
         match result {
             Ok(view) => {
                 seen.push(pose);
@@ -112,14 +101,6 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Checks that the pictures exist. A missing picture is an error in the poses file, unlike a picture without the board.
-fn check_pictures_exist(poses: &[RobotPose], folder: &Path) -> Result<()> {
-    match poses.iter().map(|pose| folder.join(&pose.picture)).find(|picture| !picture.exists()) {
-        Some(missing) => bail!("{}: expected the picture of a robot pose, found no such file", missing.display()),
-        None => Ok(()),
-    }
-}
-
 /// Adds the option that corrects the error.
 fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
     match error {
@@ -131,38 +112,19 @@ fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
     }
 }
 
-fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {
-    let path = folder.join(&pose.picture);
-    let picture = sdg_inputs::read_image_in(&path, PixelFrame::Sensor)?;
-    if let Err(error) = camera.check_picture(picture.dimensions()) {
-        bail!("{}: {error}", path.display());
-    }
-    let corners = find_board(&grey(&picture), board).with_context(|| named(&path))?;
-    Ok(HandEyeView { base_from_flange: pose.base_from_flange, corners })
-}
-
 fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose], lines: Vec<Value>) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    let (frame, board_frame) = match mount {
-        Mount::Hand => ("flange", "base"),
-        Mount::Base => ("base", "flange"),
-    };
-    let median = upper_median(found.pictures_rms_px.iter().copied()).context("no picture was used")?;
-    let widest = |k: usize| found.spread.iter().map(|spread| spread[k]).fold(0.0, f64::max);
-    let (spread_mm, spread_deg) = (1000.0 * widest(0), widest(1).to_degrees());
     if args.json {
-        let robot =
-            found.robot_sigma.map(|[metres, radians]| json!({"mm": 1000.0 * metres, "deg": radians.to_degrees()}));
-        let object = json!({
-            (format!("{frame}_from_camera")): pose_json(&found.frame_from_camera),
-            (format!("{board_frame}_from_board")): pose_json(&found.frame_from_board),
-            "sigma_mm": 1000.0 * found.sigma_m, "sigma_deg": found.sigma_rad.to_degrees(), "rms_px": found.rms_px,
-            "board_rms_px": found.board_rms_px, "robot_sigma": robot, "spread_mm": spread_mm, "spread_deg": spread_deg,
-            "pictures": lines, "out": args.out.as_deref().map(named),
-        });
+        let mut object = found.to_json(mount);
+        object["pictures"] = json!(lines);
+        object["out"] = json!(args.out.as_deref().map(named));
         writeln!(stdout, "{object}")?;
         return Ok(());
     }
+    let [frame, _] = HandEye::frame_names(mount);
+    let median = upper_median(found.pictures_rms_px.iter().copied()).context("no picture was used")?;
+    let [spread_m, spread_rad] = found.max_spread();
+    let (spread_mm, spread_deg) = (1000.0 * spread_m, spread_rad.to_degrees());
     let [x, y, z]: [f64; 3] = (found.frame_from_camera.translation.vector * 1000.0).into();
     let [i, j, k, w]: [f64; 4] = found.frame_from_camera.rotation.coords.into();
     writeln!(

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use sdg_calibration::{
-    ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPose, TablePose, bent_px, find_board,
-    focal_cost, guess_camera, locate_sheet,
+    ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPlacement, SheetPose, bent_px, focal_cost,
+    guess_camera, locate_sheet, pose_json,
 };
-use sdg_demonstration::PixelFrame;
-use sdg_inputs::camera_files;
+use sdg_inputs::{BoardPicture, camera_files};
 use serde_json::{Value, json};
 
-use super::board_in_use::{BoardInUse, grey, named, pose_json};
+use super::board_in_use::{BoardInUse, named};
 use crate::exit::{Outcome, Usage};
 use crate::shared_args::height_mm;
 
@@ -86,21 +85,18 @@ const MAX_REACH_MM: f64 = 5000.0;
 /// Finds the camera's pose above the sheet and writes it into a camera file.
 pub fn run(args: &TableArgs) -> Result<Outcome> {
     let board = args.board.read()?;
-    let frame_from_sheet = frame_from_sheet(args)?;
+    let placement = placement(args)?;
     let existing = args.camera.as_deref().map(camera_files::read).transpose()?;
     let Some(out) = args.out.as_ref().or(args.camera.as_ref()) else {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
     sdg_files::check_extendable(out, args.camera.as_deref())?;
-    let picture = sdg_inputs::read_image_in(&args.picture, PixelFrame::Sensor)?;
-    if let Some((camera, _)) = &existing {
-        camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
-    }
-    let corners = find_board(&grey(&picture), &board).with_context(|| named(&args.picture))?;
-    let (mut camera, source) = match &existing {
+    let camera_in_use = existing.as_ref().map(|(camera, _)| camera);
+    let BoardPicture { size, corners, .. } = BoardPicture::read(&args.picture, &board, camera_in_use)?;
+    let (camera, source) = match &existing {
         Some((camera, _)) => (camera.clone(), FocalSource::File),
         None => {
-            let guessed = guess_camera(picture.dimensions(), &board, &corners, args.focal_px);
+            let guessed = guess_camera(size, &board, &corners, args.focal_px);
             let Some((camera, source)) = guessed else {
                 bail!("expected --focal-px of some pixels, found {}", args.focal_px.unwrap_or_default());
             };
@@ -111,13 +107,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
         }
     };
     let sheet = locate_sheet(&camera.intrinsics, &board, &corners).with_context(|| named(&args.picture))?;
-    let (frame, height_m) = match args.sheet_in_base_mm[..] {
-        [] => (Frame::Table, 0.0),
-        _ => (Frame::Base, args.table_height_mm / 1000.0),
-    };
-    let workspace = camera.table.as_ref().filter(|table| table.frame == frame).and_then(|table| table.workspace);
-    let frame_from_camera = frame_from_sheet * sheet.sheet_from_camera;
-    camera.table = Some(TablePose { frame, height_m, frame_from_camera, workspace });
+    let camera = placement.place(camera, &sheet);
     let text = match &existing {
         Some((_, text)) => camera.update_yaml(text).with_context(|| named(out))?,
         None => camera.to_yaml(),
@@ -130,21 +120,24 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The transform from the sheet's frame to the frame of the file.
-fn frame_from_sheet(args: &TableArgs) -> Result<Isometry3<f64>> {
+/// The sheet's place in the frame of the file.
+fn placement(args: &TableArgs) -> Result<SheetPlacement> {
     let thickness = args.sheet_thickness_mm;
-    let [x, y] = match args.sheet_in_base_mm[..] {
-        [] => [0.0, 0.0],
-        [x, y] => [x, y],
+    let (frame, [x, y], height_mm) = match args.sheet_in_base_mm[..] {
+        [] => (Frame::Table, [0.0, 0.0], 0.0),
+        [x, y] => (Frame::Base, [x, y], args.table_height_mm),
         _ => return Err(Usage("expected --sheet-in-base-mm X,Y".to_owned()).into()),
     };
     let values = [x, y, args.table_height_mm, thickness, args.mark_height_mm, args.sheet_yaw_deg];
     if let Some(value) = values.into_iter().find(|value| !(-MAX_REACH_MM..=MAX_REACH_MM).contains(value)) {
         return Err(Usage(format!("expected lengths up to {MAX_REACH_MM} mm, found {value}")).into());
     }
-    let translation = Translation3::new(x, y, args.table_height_mm + thickness).vector / 1000.0;
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), args.sheet_yaw_deg.to_radians());
-    Ok(Isometry3::from_parts(translation.into(), rotation))
+    Ok(SheetPlacement {
+        frame,
+        origin_m: Vector3::new(x, y, args.table_height_mm + thickness) / 1000.0,
+        yaw_rad: args.sheet_yaw_deg.to_radians(),
+        table_height_m: height_mm / 1000.0,
+    })
 }
 
 fn report(

@@ -7,19 +7,20 @@
 
 use std::io::Write;
 use std::sync::Arc;
-use std::time::{Instant, UNIX_EPOCH};
+use std::time::Instant;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use image::RgbImage;
 use sdg_camera::{Address, Frame, MjpegServer};
-use sdg_cell::{FoundRecord, FrameDetector, Frames, Next, Part, Perception, drawing};
-use sdg_grasp::{GraspDetection, TrackState, TrackerConfig, Verification};
-use serde::Serialize;
+use sdg_cell::{
+    DetectionWords, FrameDetector, FrameRecord, FrameSize, FrameSizes, Frames, Next, Part, Perception, drawing,
+    track_state_name,
+};
+use sdg_grasp::{GraspDetection, TrackerConfig, Verification};
 
 use super::args::DetectArgs;
-use super::region_record::RegionRecord;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::found_text::Wording;
+use crate::found_text::FoundText;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
@@ -51,7 +52,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     let mut found_any = false;
     let [mut num_searched, mut num_failed] = [0_u64; 2];
     let mut left = args.frames.unwrap_or(u64::MAX);
-    let mut sizes = Sizes::default();
+    let mut sizes = FrameSizes::default();
     while left > 0 && !interrupt.is_requested() {
         let mut frame = match frames.take() {
             Next::Frame(frame) => frame,
@@ -67,13 +68,16 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
         // In a folder, every picture of a wrong size is reported, like every other unusable picture.
-        if !matches!(address, Address::Folder { .. })
-            && let Some(error) = sizes.check(finder.perception(), &picture)?
-        {
-            if let Some(error) = error {
-                write_error(&mut stdout, args, address, &error.context(format!("frame {}", frame.number)))?;
+        if !matches!(address, Address::Folder { .. }) {
+            match sizes.check(finder.perception(), &picture).context("the camera's pictures")? {
+                FrameSize::Right => {}
+                FrameSize::WrongAgain => continue,
+                FrameSize::Wrong(error) => {
+                    let skipped = anyhow!("frames of this size are skipped: {}", one_line(&error.into()));
+                    write_error(&mut stdout, args, address, &skipped.context(format!("frame {}", frame.number)))?;
+                    continue;
+                }
             }
-            continue;
         }
         let parts = match finder.find(&picture, &frame) {
             Ok(parts) => parts,
@@ -105,37 +109,6 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// Skips frames of a wrong size: after a camera is switched to another size, neither the region nor the calibration
-/// applies.
-#[derive(Default)]
-struct Sizes {
-    /// Whether a frame of the right size has arrived.
-    is_any_right: bool,
-    /// The last reported wrong size; `None` after a frame of the right size.
-    told: Option<(u32, u32)>,
-}
-
-impl Sizes {
-    /// `None` if the picture can be searched. A picture of a wrong size is skipped; the first one of its size in a
-    /// row returns the error to report.
-    ///
-    /// # Errors
-    /// The first picture of the stream has a wrong size: the following pictures would have it as well, and all would be
-    /// skipped.
-    fn check(&mut self, detector: &Perception, picture: &RgbImage) -> Result<Option<Option<anyhow::Error>>> {
-        let Err(error) = detector.check_picture(picture) else {
-            *self = Self { is_any_right: true, told: None };
-            return Ok(None);
-        };
-        if !self.is_any_right {
-            return Err(anyhow::Error::from(error).context("the camera's pictures"));
-        }
-        let is_told = self.told.replace(picture.dimensions()) == Some(picture.dimensions());
-        let skipped = || anyhow!("frames of this size are skipped: {}", one_line(&error.into()));
-        Ok(Some((!is_told).then(skipped)))
-    }
-}
-
 /// Opens the camera with the size of its calibration, or of the model's region.
 fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<Frames> {
     let mut options = args.request.options();
@@ -155,14 +128,6 @@ fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<F
     Ok(Frames::of(live_pictures::open(address, &options)?, address))
 }
 
-fn state_name(state: TrackState) -> &'static str {
-    match state {
-        TrackState::Followed => "followed",
-        TrackState::FoundAgain => "found_again",
-        TrackState::Lost => "lost",
-    }
-}
-
 fn write_line(
     out: &mut impl Write,
     args: &DetectArgs,
@@ -173,46 +138,28 @@ fn write_line(
     parts: &[Part],
 ) -> Result<()> {
     let shown: Vec<&Part> = parts.iter().filter(|part| args.all || part.is_seen(args.min_score)).collect();
-    let wording =
-        Wording { detector, picture_size: [width, height], min_score: args.min_score, paint: Paint::stdout() };
+    let words = DetectionWords { detector, picture_size: [width, height], min_score: args.min_score };
+    let text = FoundText { words, paint: Paint::stdout() };
     let detections: Vec<&GraspDetection> = shown.iter().map(|part| &part.found.detection).collect();
-    let touched = wording.touched(&detections);
+    let touched = words.touched(&detections);
     if args.json {
-        let record = |(part, touched): (&&Part, Vec<usize>)| PartLine {
-            found: FoundRecord::new(&part.found, detector),
-            jaws_touch: touched,
-            track: part.track.map(|(id, ..)| id),
-            state: part.track.map(|(_, state, _)| state_name(state)),
-            age_s: part.track.map(|(.., age)| age.as_secs_f64()),
-        };
-        let fault = |fault: &sdg_camera::Fault| FaultLine { fault: fault.name(), why: fault.to_string() };
-        let line = FrameLine {
-            camera: &frame.camera,
-            object: detector.model().object(),
-            frame: frame.number,
-            captured: frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
-            width,
-            height,
-            seconds,
-            region: detector.region().map(RegionRecord::of),
-            faults: frame.faults.iter().map(fault).collect(),
-            detections: shown.iter().zip(touched).map(record).collect(),
-        };
+        let line = FrameRecord::new(frame, (width, height), detector, seconds, &shown, touched);
         writeln!(out, "{}", json_line(&line)?)?;
     } else {
         for fault in &frame.faults {
             writeln!(out, "frame {}: {fault}", frame.number)?;
         }
         if shown.is_empty() {
-            let nothing = wording.paint.text(Tone::Doubtful, "nothing to grasp");
+            let nothing = text.paint.text(Tone::Doubtful, "nothing to grasp");
             writeln!(out, "frame {}: {nothing} ({:.1} ms)", frame.number, 1e3 * seconds)?;
         }
         for (part, touched) in shown.iter().zip(touched) {
             let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
-            let of =
-                part.track.map(|(id, state, _)| format!("part {} {}, ", id + 1, state_name(state).replace('_', " ")));
-            let text = wording.line(&part.found, &touched);
-            writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
+            let of = part
+                .track
+                .map(|(id, state, _)| format!("part {} {}, ", id + 1, track_state_name(state).replace('_', " ")));
+            let line = text.line(&part.found, &touched);
+            writeln!(out, "frame {}: {}{line} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }
     // Flushed, because programs that read the output wait for this frame.
@@ -229,43 +176,4 @@ fn write_error(out: &mut impl Write, args: &DetectArgs, address: &Address, error
         eprintln!("{error}");
     }
     Ok(())
-}
-
-/// One line of `--json`: a frame.
-#[derive(Serialize)]
-struct FrameLine<'a> {
-    camera: &'a str,
-    /// Name of the part that the model detects.
-    object: &'a str,
-    frame: u64,
-    /// Seconds since 1970.
-    captured: f64,
-    width: u32,
-    height: u32,
-    seconds: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    region: Option<RegionRecord>,
-    faults: Vec<FaultLine>,
-    detections: Vec<PartLine>,
-}
-
-#[derive(Serialize)]
-struct FaultLine {
-    fault: &'static str,
-    why: String,
-}
-
-#[derive(Serialize)]
-struct PartLine {
-    #[serde(flatten)]
-    found: FoundRecord,
-    /// As in the records of pictures: the indices of the parts that the jaws would touch.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    jaws_touch: Vec<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    track: Option<u64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    state: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    age_s: Option<f64>,
 }

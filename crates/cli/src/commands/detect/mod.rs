@@ -3,25 +3,22 @@
 mod args;
 mod inputs;
 mod live;
-mod region_record;
 
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use image::RgbImage;
-use sdg_cell::{DEFAULT_MIN_SCORE, Found, FoundRecord, Perception, drawing};
+use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Perception, SearchedPicture};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument};
 use serde::Serialize;
 
 pub use args::DetectArgs;
-use region_record::RegionRecord;
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::found_text::{Wording, advice_with_options};
+use crate::found_text::{FoundText, advice_with_options};
 use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::RegionArg;
@@ -118,7 +115,7 @@ struct Batch<'a, W> {
     num_with_parts: usize,
 }
 
-impl<W: Write> Batch<'_, W> {
+impl<'a, W: Write> Batch<'a, W> {
     /// Detects parts in a picture and prints its lines. For a picture that cannot be used, reports the error.
     ///
     /// # Errors
@@ -127,10 +124,11 @@ impl<W: Write> Batch<'_, W> {
         match self.detect(input) {
             Ok(seen) => {
                 self.num_used += 1;
-                let num_found = seen.accepted(self.args.min_score).count();
+                let text = self.text(&seen);
+                let num_found = seen.listed(&text.words, false).len();
                 self.num_found += num_found;
                 self.num_with_parts += usize::from(num_found > 0);
-                seen.write(&mut self.stdout, self.args, self.detector, &input.name())
+                write(&mut self.stdout, self.args, &seen, &text, &input.name())
             }
             Err(error) => self.failed(&input.name(), &error),
         }
@@ -159,118 +157,51 @@ impl<W: Write> Batch<'_, W> {
         Ok(())
     }
 
-    fn detect(&mut self, input: &PictureInput) -> Result<Seen> {
+    fn text(&self, seen: &SearchedPicture) -> FoundText<'a> {
+        let words = DetectionWords { detector: self.detector, picture_size: seen.size, min_score: self.args.min_score };
+        FoundText { words, paint: Paint::stdout() }
+    }
+
+    fn detect(&mut self, input: &PictureInput) -> Result<SearchedPicture> {
         let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
-        let image = input.read(self.detector.pixel_frame())?;
+        let mut image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
         let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
-        let seen = Seen { size: image.dimensions().into(), seconds: start.elapsed().as_secs_f64(), detections };
+        let seconds = start.elapsed().as_secs_f64();
+        let seen = SearchedPicture { size: image.dimensions().into(), seconds, detections };
         if let Some(folder) = &self.args.draw {
-            let wording = seen.wording(self.detector, self.args.min_score);
-            let drawn = drawn(image, &seen.detections, &wording);
-            sdg_files::write_drawing(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
+            seen.draw(&mut image, &self.text(&seen).words);
+            sdg_files::write_drawing(&folder.join(input.drawn_name(&mut self.drawn)), &image)?;
         }
         Ok(seen)
     }
 }
 
-/// The picture with its detections drawn, and for the best refused ones the reasons and the differences from the
-/// demonstration.
-fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImage {
-    let detections = || found.iter().map(|found| &found.detection);
-    let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
-    let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
-    let parts: Vec<_> = detections().map(|detection| detection.bbox).collect();
-    let legend = drawing::draw_differences(&mut image, &differences, &parts);
-    drawing::draw_region(&mut image, wording.detector.region());
-    let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
-    drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons, legend);
-    image
-}
-
-/// An image and its detections.
-struct Seen {
-    size: [u32; 2],
-    seconds: f64,
-    detections: Vec<Found>,
-}
-
-impl Seen {
-    fn accepted(&self, min_score: f64) -> impl Iterator<Item = &Found> {
-        self.detections.iter().filter(move |found| found.detection.score >= min_score)
+/// Prints the lines of a picture, or its JSON line.
+fn write(
+    out: &mut impl Write,
+    args: &DetectArgs,
+    seen: &SearchedPicture,
+    text: &FoundText<'_>,
+    name: &str,
+) -> Result<()> {
+    let FoundText { words, .. } = text;
+    let listed = seen.listed(words, args.all);
+    let detections: Vec<&GraspDetection> = listed.iter().map(|found| &found.detection).collect();
+    let touched = words.touched(&detections);
+    if args.json {
+        writeln!(out, "{}", json_line(&seen.record(name, words, &listed, touched, advice_with_options))?)?;
+        return Ok(());
     }
-
-    fn wording<'a>(&self, detector: &'a Perception, min_score: f64) -> Wording<'a> {
-        Wording { detector, picture_size: self.size, min_score, paint: Paint::stdout() }
+    let refused = seen.refused(words);
+    if refused.len() == seen.detections.len() {
+        writeln!(out, "{name}: {}", text.nothing(&refused, args.all))?;
     }
-
-    fn write(&self, out: &mut impl Write, args: &DetectArgs, detector: &Perception, name: &str) -> Result<()> {
-        let wording = self.wording(detector, args.min_score);
-        let refused: Vec<&GraspDetection> =
-            self.detections.iter().map(|found| &found.detection).filter(|found| !wording.is_accepted(found)).collect();
-        let listed: Vec<&Found> =
-            self.detections.iter().filter(|found| args.all || wording.is_accepted(&found.detection)).collect();
-        let detections: Vec<&GraspDetection> = listed.iter().map(|found| &found.detection).collect();
-        let touched = wording.touched(&detections);
-        if args.json {
-            let record = |(found, touched): (&&Found, Vec<usize>)| PictureRecord {
-                found: FoundRecord::new(found, detector),
-                size: detector.size_of(&found.detection, self.size),
-                advice: found.detection.advice().map(advice_with_options),
-                jaws_touch: touched,
-            };
-            let line = ImageLine {
-                image: name,
-                object: detector.model().object(),
-                width: self.size[0],
-                height: self.size[1],
-                seconds: self.seconds,
-                region: detector.region().map(RegionRecord::of),
-                num_refused: refused.len(),
-                detections: listed.iter().zip(touched).map(record).collect(),
-            };
-            writeln!(out, "{}", json_line(&line)?)?;
-            return Ok(());
-        }
-        if refused.len() == self.detections.len() {
-            writeln!(out, "{name}: {}", wording.nothing(&refused, args.all))?;
-        }
-        for (found, touched) in listed.iter().zip(touched) {
-            let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
-            writeln!(out, "{name}: {}", wording.line(found, &touched))?;
-        }
-        Ok(())
+    for (found, touched) in listed.iter().zip(touched) {
+        let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
+        writeln!(out, "{name}: {}", text.line(found, &touched))?;
     }
-}
-
-/// One line of `--json` (docs/command-line.md).
-#[derive(Serialize)]
-struct ImageLine<'a> {
-    image: &'a str,
-    /// Name of the part that the model detects.
-    object: &'a str,
-    width: u32,
-    height: u32,
-    seconds: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    region: Option<RegionRecord>,
-    num_refused: usize,
-    detections: Vec<PictureRecord>,
-}
-
-/// A detection with values that explain it.
-#[derive(Serialize)]
-struct PictureRecord {
-    #[serde(flatten)]
-    found: FoundRecord,
-    /// Size of the part relative to its nominal size.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    size: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    advice: Option<String>,
-    /// Indices, in the list of detections, of the parts that the jaws would touch.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    jaws_touch: Vec<usize>,
+    Ok(())
 }
 
 /// One line of `--json` for a picture that cannot be used.

@@ -4,12 +4,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use sdg_cell::CellError;
-use sdg_evaluation::Progress;
-use sdg_evaluation::labelled_pictures::{
-    Evaluated, LabelledFolder, LeftOut, Tested, Totals, in_words, judge, page, summary, to_json,
-};
-use sdg_grasp::{GraspError, Verification};
+use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, TestedFolder, Totals, page, summary, to_json};
+use sdg_grasp::Verification;
 use sdg_inputs::camera_files;
 
 use super::args::EvaluateArgs;
@@ -32,41 +28,18 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let model = sdg_inputs::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
-    let mut labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
+    let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     sdg_files::prepare_folder(&report_folder)?;
 
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let progress = EvaluationProgress::new();
-    progress.expect(labelled.pictures.len());
-    let mut tested = Vec::with_capacity(labelled.pictures.len());
-    for picture in labelled.pictures {
-        let name = picture.name();
-        let of_picture = match Tested::detect(picture, &detector, verification) {
-            Ok(of_picture) => of_picture,
-            // The model's region is for pictures of a different size.
-            Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
-                labelled.left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        let judged = judge(&of_picture, args.min_score);
-        progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
-        tested.push(of_picture);
-    }
+    let TestedFolder { tested, left_out, others } =
+        labelled.test(&detector, verification, args.min_score, &progress)?;
     progress.finish();
 
-    let evaluated = Evaluated {
-        folder,
-        model_file,
-        model,
-        verification,
-        min_score: args.min_score,
-        tested,
-        left_out: labelled.left_out,
-        others: labelled.others,
-    };
+    let evaluated =
+        Evaluated { folder, model_file, model, verification, min_score: args.min_score, tested, left_out, others };
     let report = page(&evaluated, &command(args, folder, model_file))?.write(&report_folder)?;
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);

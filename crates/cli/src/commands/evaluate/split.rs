@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use sdg_evaluation::Progress;
-use sdg_evaluation::split::{Measured, ReadySet, Side, SplitSet, candidates, read_split, summary, tables};
+use sdg_evaluation::split::{
+    ReadySet, Side, SplitSet, candidates, measure, read_split, results_json, sides_of, tables,
+};
 use sdg_grasp::ModelKind;
-use serde_json::json;
 
 use super::args::EvaluateArgs;
 use super::model_names::models;
@@ -26,8 +26,7 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     let is_measured = |set: &SplitSet| !args.split.tuned || set.side == Side::Tuned;
     let sets = read_split(file)?.into_iter().filter(is_measured);
     let sets = sets.map(|set| ReadySet::open(set, sets_folder)).collect::<Result<Vec<_>>>()?;
-    let sides: Vec<Side> =
-        Side::ALL.into_iter().filter(|side| sets.iter().any(|ready| ready.set.side == *side)).collect();
+    let sides = sides_of(&sets);
     if sides.is_empty() {
         bail!("{}: expected sets to measure, found none", file.display());
     }
@@ -36,27 +35,10 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     }
 
     let progress = EvaluationProgress::new();
-    progress.expect(models.len() * seeds.len() * sets.len());
-    let mut measured = Vec::with_capacity(models.len());
-    for model in models {
-        let mut of_model = Measured { model, seeds: seeds.clone(), runs: Vec::new() };
-        for &seed in seeds {
-            for ready in &sets {
-                let run = ready.run(model, seed)?;
-                progress.unit_done(&format!("model {model}, seed {seed}, {}: {}", ready.set.name, run.in_words()));
-                of_model.runs.push(run);
-            }
-        }
-        measured.push(of_model);
-    }
+    let measured = measure(&models, seeds, &sets, &progress)?;
     progress.finish();
 
-    let results = json!({
-        "split": file.display().to_string(),
-        "sides": sides,
-        "version": env!("CARGO_PKG_VERSION"),
-        "models": measured.iter().map(|of_model| summary(of_model, &sides)).collect::<Vec<_>>(),
-    });
+    let results = results_json(file, &sides, &measured);
     if let Some(path) = &args.split.results {
         sdg_files::write(path, results.to_string().as_bytes())?;
     }

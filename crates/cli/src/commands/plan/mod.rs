@@ -1,14 +1,13 @@
 //! `sdg plan`: a motion around the obstacles of a workcell, described and drawn; nothing moves.
 
 mod arguments;
-mod explain;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use sdg_cell::{ExplainedPlan, refused_by_limits, turned_goals};
 use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
@@ -20,7 +19,6 @@ use crate::exit::{Outcome, Usage};
 use crate::json_line::json_line;
 use crate::robots;
 use arguments::{GoalPose, Held, JointsDeg};
-use explain::Explained;
 
 /// `sdg plan`
 #[derive(Debug, Args)]
@@ -87,7 +85,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
             found.join(",")
         );
     }
-    let goals = goals(args);
+    let goals = turned_goals(args.goal.iter().map(|GoalPose(pose)| *pose), args.turns);
     let mut options = PlanOptions::default();
     (options.seed, options.margin_m) = (args.seed, args.margin_mm * 1e-3);
 
@@ -98,7 +96,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         (pace.free_limits(arm), arm.cartesian_limits, ArmDynamics::new(arm, args.opening_mm * 1e-3));
     let motions = plan.trajectories(&joints, &tcp, &dynamics)?;
     let stopping_secs = plan.stopping_secs(&joints, &tcp, &dynamics)?;
-    let explained = Explained::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
+    let explained = ExplainedPlan::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
     eprint!("{}", explained.text());
     if let Some(refused) = refused_by_limits(&workcell, &motions) {
         eprintln!("  sdg grasp would reject it: {refused}");
@@ -110,21 +108,6 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         draw(args, &workcell, &motions)?;
     }
     Ok(Outcome::Done)
-}
-
-/// Each goal pose at all rotations about its z axis.
-fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
-    let turn = |index: u32| {
-        let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(args.turns);
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad)
-    };
-    args.goal.iter().flat_map(|GoalPose(pose)| (0..args.turns).map(move |index| pose * turn(index))).collect()
-}
-
-/// The first limit of `sdg grasp` that the motions violate: the workspace, the table, the tcp's speed.
-fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<String> {
-    let limits = workcell.safety_limits();
-    motions.iter().find_map(|motion| limits.check(motion.clone()).err()).map(|violation| violation.to_string())
 }
 
 #[cfg(feature = "simulation")]

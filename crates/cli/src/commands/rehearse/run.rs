@@ -4,14 +4,13 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
+use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, RehearsedPlace};
 use sdg_evaluation::run_page::{self, RunPage};
-use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
+use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes, attempt_in_words, run_json};
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{GraspError, GraspModel, Verification};
 use sdg_inputs::camera_files::CameraFile;
 use sdg_report::AttemptSummary;
-use serde_json::json;
 
 use super::RehearseArgs;
 use crate::commands::devices;
@@ -123,47 +122,21 @@ fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
 
 /// Prints one line per attempt; breaks after Ctrl-C.
 pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) -> ControlFlow<()> {
-    let error = attempt
-        .detection_error
-        .map(|e| format!(", detected {:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg))
-        .unwrap_or_default();
-    let outcome = if attempt.success {
-        match step_name(attempt) {
-            "check" => "placed".to_owned(),
-            _ => "grasped and held".to_owned(),
-        }
-    } else {
-        format!("failed at {}: {}", step_name(attempt), attempt.why)
-    };
-    eprintln!("attempt {} of {of}: {outcome}{error} ({:.1} s)", attempt.number, attempt.duration_secs);
+    eprintln!("attempt {} of {of}: {}", attempt.number, attempt_in_words(attempt));
     if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 /// Prints the closing lines, or the JSON object of `--json` (docs/command-line.md).
 pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Path, json: bool) -> Result<Outcome> {
-    let RunPage { model, object, rehearsed, .. } = page;
-    let Rehearsed { attempts, .. } = rehearsed;
-    let (successes, of) = (rehearsed.successes(), attempts.len());
+    let RunPage { object, rehearsed, .. } = page;
     if json {
-        let mut line = json!({
-            "model": model.kind().letter(),
-            "object": object.name,
-            "part": object.description,
-            "attempts": of,
-            "successes": successes,
-            "failures": rehearsed.failures(),
-            "report": report.display().to_string(),
-        });
-        if let Some(seconds) = teach_seconds {
-            line["teach_seconds"] = json!(seconds);
-        }
-        println!("{}", json_line(&line)?);
+        println!("{}", json_line(&run_json(page, teach_seconds, report))?);
     } else {
         if let Some(seconds) = teach_seconds {
             println!("taught the {} from one photo in {seconds:.0} s", object.title.to_lowercase());
         }
         let done = if rehearsed.is_placing { "placed" } else { "grasped" };
-        println!("{done} it in {successes} of {of} attempts");
+        println!("{done} it in {} of {} attempts", rehearsed.successes(), rehearsed.attempts.len());
         println!("report: {}", report.display());
     }
     Ok(if rehearsed.found_nothing() { Outcome::NothingToGrasp } else { Outcome::Done })

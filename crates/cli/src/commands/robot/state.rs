@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use clap::Args;
-use nalgebra::Isometry3;
+use sdg_calibration::pose_json;
 use sdg_robot::Arm;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::arm_args::ArmArgs;
 use crate::exit::Outcome;
@@ -31,8 +31,8 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
             "robot": address.to_string(),
             "mode": state.mode.name(),
             "joints_rad": state.q.as_slice(),
-            "base_from_tcp": pose(&base_from_tcp),
-            "base_from_flange": pose(&arm.geometry().base_from_flange(&state.q)),
+            "base_from_tcp": pose_json(&base_from_tcp),
+            "base_from_flange": pose_json(&arm.geometry().base_from_flange(&state.q)),
             "external_torques_nm": state.tau_external_nm.as_slice(),
             "hand": {"opening_m": hand.opening_m, "is_grasping": hand.is_grasping},
         });
@@ -46,10 +46,4 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
         println!("hand   {:.1} mm open{holds}", hand.opening_m * 1e3);
     }
     Ok(Outcome::Done)
-}
-
-/// A pose in the format of a poses file for `sdg camera hand-eye`.
-fn pose(base_from_frame: &Isometry3<f64>) -> Value {
-    let (p, r) = (base_from_frame.translation.vector, base_from_frame.rotation.coords);
-    json!({"translation_m": p.as_slice(), "rotation_xyzw": r.as_slice()})
 }

@@ -1,14 +1,32 @@
-//! A plan in words and as JSON.
+//! A motion planned around the obstacles of a workcell, in words and as JSON.
 
 use std::fmt::Write;
 
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::{CollisionModel, Proximity};
 use sdg_kinematics::planning::{Plan, PlanPart, nearest_on, plan_parts};
 use sdg_kinematics::{ArmGeometry, JointVector, Trajectory};
+use sdg_robot::workcell::Workcell;
 use serde_json::{Value, json};
 
+/// Each goal pose at `turns` equally spaced rotations about its z axis.
+pub fn turned_goals(goals: impl Iterator<Item = Isometry3<f64>>, turns: u32) -> Vec<Isometry3<f64>> {
+    let turn = |index: u32| {
+        let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(turns);
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad)
+    };
+    goals.flat_map(|pose| (0..turns).map(move |index| pose * turn(index))).collect()
+}
+
+/// The first limit of a grasp in this workcell that the motions violate: the workspace, the table, the tcp's speed.
+pub fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<String> {
+    let limits = workcell.safety_limits();
+    motions.iter().find_map(|motion| limits.check(motion.clone()).err()).map(|violation| violation.to_string())
+}
+
 /// A plan and its key figures.
-pub(super) struct Explained {
+#[derive(Debug, Clone)]
+pub struct ExplainedPlan {
     arm: ArmGeometry,
     start: JointVector,
     parts: Vec<PlanPart>,
@@ -25,8 +43,10 @@ pub(super) struct Explained {
     planning_ms: f64,
 }
 
-impl Explained {
-    pub(super) fn new(
+impl ExplainedPlan {
+    /// Explains a plan to one of several goals, each at `turns` angles as made by [`turned_goals`]. `stopping_secs` is the
+    /// duration with a stop at every waypoint, `planning_ms` the time that the planner took.
+    pub fn new(
         model: &CollisionModel,
         plan: &Plan,
         motions: &[Trajectory],
@@ -51,7 +71,8 @@ impl Explained {
         }
     }
 
-    pub(super) fn text(&self) -> String {
+    /// The plan in lines of text.
+    pub fn text(&self) -> String {
         let mut text = String::new();
         let mut line = |what: String| writeln!(text, "  {what}").expect("writing to a string cannot fail");
         let (secs, num_motions) = (self.secs, self.num_motions);
@@ -91,7 +112,8 @@ impl Explained {
         text
     }
 
-    pub(super) fn json(&self) -> Value {
+    /// The plan as JSON, as printed by `sdg plan`.
+    pub fn json(&self) -> Value {
         let degrees = |q: &JointVector| q.iter().map(|angle| angle.to_degrees()).collect::<Vec<_>>();
         let near = |nearest: &Proximity| {
             json!({

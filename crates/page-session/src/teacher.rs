@@ -1,33 +1,33 @@
-//! Teaching and detection for the annotation page, whose crate does not depend on grasp models.
+//! Teaching for the annotation page, whose crate does not depend on grasp models.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
-use image::RgbImage;
+use nalgebra::Point2;
 use sdg_annotate::{
-    Figures, FoundGrasp, GraspPose, GraspTeacher, NegativesRefused, Refusal, Region, TaughtModel, TaughtSummary,
-    TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
+    CameraPictures, Figures, GraspTeacher, LiveOptions, NegativesRefused, Region, SizeCheck, TaughtModel,
+    TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
-use sdg_calibration::Frame;
-use sdg_cell::DEFAULT_MIN_SCORE;
-use sdg_cell::{Found, Perception};
+use sdg_camera::{Address, Camera, OpenOptions, PixelFrame};
+use sdg_cell::Perception;
 use sdg_demonstration::Demonstration;
-use sdg_evaluation::TaughtFile;
 use sdg_evaluation::held_back::HeldBackFigures;
-use sdg_evaluation::{Share, wilson_interval};
+use sdg_evaluation::{Share, TaughtFile, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
-    Advice, CheckConfig, GraspModel, PlanarPose, Preset, SearchRegion, TeachOptions, TeachingEvent, Verification,
-    check_region_from_above, check_teaching_region,
+    CheckConfig, GraspModel, Preset, TeachOptions, TeachingEvent, check_region_from_above, check_teaching_region,
 };
 use sdg_inputs::camera_files::CameraFile;
+use sdg_inputs::one_line;
+use sdg_kinematics::HAND_OPENING_MAX_M;
 
-use crate::found_text::{MIN_ADVISED_SCORE, Wording, advice_in_words};
-use crate::paint::Paint;
+use crate::model::PageModel;
+use crate::region::search_region;
 
 /// Teaches models with one preset.
+#[derive(Debug, Clone)]
 pub struct PageTeacher {
     /// Network, training and augmentation.
     pub preset: Preset,
@@ -48,7 +48,7 @@ impl GraspTeacher for PageTeacher {
         let figures = file.figures(&demonstrations, request.seed)?;
         let TaughtFile { model, bytes, .. } = file;
         let summary = summary(&model, Some(page_figures(&figures)), start.elapsed().as_secs_f64());
-        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+        Ok(Box::new(PageModel::new(self.detector(model)?, summary, bytes)))
     }
 
     fn teach_on_trial(
@@ -60,7 +60,7 @@ impl GraspTeacher for PageTeacher {
         let (file, _) = self.taught_file(material, request, &mut |_| ControlFlow::Continue(()))?;
         let TaughtFile { model, bytes, .. } = file;
         let summary = summary(&model, None, start.elapsed().as_secs_f64());
-        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+        Ok(Box::new(PageModel::new(self.detector(model)?, summary, bytes)))
     }
 
     fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError> {
@@ -76,8 +76,7 @@ impl GraspTeacher for PageTeacher {
 
     fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
         let model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
-        let detector = Mutex::new(self.detector(model)?);
-        Ok(Box::new(PageModel { detector, summary: summary.clone(), bytes: bytes.to_vec() }))
+        Ok(Box::new(PageModel::new(self.detector(model)?, summary.clone(), bytes.to_vec())))
     }
 }
 
@@ -126,14 +125,35 @@ impl PageTeacher {
     }
 }
 
-fn search_region(region: &Region) -> SearchRegion {
-    let Region { x, y, width, height, picture } = *region;
-    SearchRegion { picture, ..SearchRegion::new([x, y, width, height]) }
-}
+impl PageTeacher {
+    /// The hand's maximum opening, in pixels at the centre of the photo, in the plane of the marks. It is nearly
+    /// constant over a table that is seen from above. `None` without a calibrated camera.
+    pub(crate) fn max_opening_px(&self) -> Option<f64> {
+        let (file, [mark_height_m, _]) = self.camera.as_ref()?;
+        let [width, height] = file.size_px();
+        let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+        let over_table = &file.over_table;
+        let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
+        Some(HAND_OPENING_MAX_M / scale)
+    }
 
-fn page_region(region: &SearchRegion) -> Region {
-    let SearchRegion { x, y, width, height, picture } = *region;
-    Region { x, y, width, height, picture }
+    /// The options for opening the camera of live pictures: with a calibrated camera, its size is requested.
+    pub fn open_options(&self, mut options: OpenOptions) -> OpenOptions {
+        if let Some((camera, _)) = &self.camera {
+            [options.width, options.height] = camera.size_px();
+            options.frame = PixelFrame::Sensor;
+        }
+        options
+    }
+
+    /// The live pictures of an open camera. With a calibrated camera, frames of another size are a fault.
+    pub fn live(&self, camera: Box<dyn Camera>, address: &Address, photo_path: std::path::PathBuf) -> LiveOptions {
+        let check = self.camera.clone().map(|(camera, _)| -> Box<SizeCheck> {
+            Box::new(move |size| camera.check_size(size).map_err(|error| one_line(&error)))
+        });
+        let pictures = Arc::new(CameraPictures::read(camera, matches!(address, Address::Sim(_)), check));
+        LiveOptions { pictures, address: address.to_string(), photo_path }
+    }
 }
 
 /// `seconds` includes all waiting: for the teaching and for the test of the model on held-out samples.
@@ -182,125 +202,11 @@ fn step(event: &TeachingEvent) -> TeachingStep {
     }
 }
 
-/// Only one search runs at a time, because each uses all cores.
-struct PageModel {
-    detector: Mutex<Perception>,
-    summary: TaughtSummary,
-    /// Contents of the model file.
-    bytes: Vec<u8>,
-}
-
-impl PageModel {
-    fn detector(&self) -> MutexGuard<'_, Perception> {
-        self.detector.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn find(&self, image: &RgbImage, with_places: bool) -> Result<Vec<FoundGrasp>, TeacherError> {
-        let detector = self.detector();
-        let found = detector.detect(image, Verification::ByShape)?;
-        let wording = Wording {
-            detector: &detector,
-            picture_size: image.dimensions().into(),
-            min_score: DEFAULT_MIN_SCORE,
-            paint: Paint::PLAIN,
-        };
-        let mut grasps: Vec<FoundGrasp> = found.iter().map(|found| found_grasp(&detector, found, &wording)).collect();
-        let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
-        for (grasp, touches) in grasps.iter_mut().zip(detector.touched_by_jaws(&detections)) {
-            grasp.touches = touches;
-        }
-        if with_places {
-            let explained: Vec<usize> = wording.explained(found.iter().map(|found| &found.detection));
-            let detections: Vec<_> = explained.iter().map(|&idx| &found[idx].detection).collect();
-            for (idx, differences) in explained.into_iter().zip(detector.differences(image, &detections)) {
-                if let Some((refusal, differences)) = grasps[idx].refusal.as_mut().zip(differences) {
-                    refusal.edges = differences.edges.iter().map(|place| [place.x, place.y]).collect();
-                    refusal.surface = differences.surface.iter().map(|place| [place.x, place.y]).collect();
-                }
-            }
-        }
-        Ok(grasps)
-    }
-}
-
-impl TaughtModel for PageModel {
-    fn summary(&self) -> TaughtSummary {
-        self.summary.clone()
-    }
-
-    fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
-        Ok(self.bytes.clone())
-    }
-
-    fn region(&self) -> Option<Region> {
-        self.detector().region().map(page_region)
-    }
-
-    fn look_in(&self, region: Option<Region>) -> Result<(), TeacherError> {
-        Ok(self.detector().look_in(region.as_ref().map(search_region))?)
-    }
-
-    fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
-        self.find(image, false)
-    }
-
-    fn detect_explained(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
-        self.find(image, true)
-    }
-}
-
-/// The advice as text for the page, which has buttons instead of options.
-fn remedy(advice: Advice) -> String {
-    advice_in_words(advice, "demonstration", "if it is the part, learn from it: this size is then taught as well")
-}
-
-/// `touches` stays empty, because it depends on the other detections.
-fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
-    let detection = &found.detection;
-    FoundGrasp {
-        score: detection.score,
-        is_accepted: detection.is_accepted(),
-        bbox: detection.bbox,
-        outline: detection.outline.clone(),
-        grasp: detection.grasp,
-        line_length: detector.marked_length(detection),
-        pose: found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| grasp_pose(pose, frame)),
-        refusal: (!detection.is_accepted()).then(|| Refusal {
-            reason: wording.reasons(detection, 2),
-            remedy: detection.advice().filter(|_| detection.score >= MIN_ADVISED_SCORE).map(remedy),
-            ..Refusal::default()
-        }),
-        touches: Vec::new(),
-    }
-}
-
-fn grasp_pose(pose: &PlanarPose, frame: Frame) -> GraspPose {
-    GraspPose {
-        frame: frame.name(),
-        position_mm: pose.position_m.coords.map(|metres| 1e3 * metres).into(),
-        yaw_deg: pose.yaw.degrees(),
-        opening_mm: 1e3 * pose.opening_m,
-        sigma_mm: 1e3 * pose.uncertainty.position_m,
-        sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::RgbImage;
     use sdg_annotate::{Session, SessionOptions};
-    use std::sync::Arc;
-
-    #[test]
-    fn advice_about_light_compares_the_picture_with_the_photo() {
-        for (advice, light) in [(Advice::DarkerPhoto, "darker"), (Advice::BrighterPhoto, "brighter")] {
-            for text in [crate::found_text::advice_with_options(advice), remedy(advice)] {
-                // In a dark picture, "in brighter light" was read as a demand for more light.
-                let compared = format!("it is {light} here than in the photo: a second ");
-                assert!(text.contains(&compared) && text.ends_with(" in this light would help"), "{text}");
-            }
-        }
-    }
 
     #[test]
     fn the_page_shows_the_opening_that_is_taught_where_a_file_states_none() {
@@ -320,8 +226,9 @@ mod tests {
         let session =
             Session::open(&options, Arc::new(PageTeacher { preset: Preset::default(), camera: None })).unwrap();
         let on_the_page = session.marks(0).unwrap().grasp.unwrap().jaw_width;
-        let demonstrations = crate::demonstrations::read_all(&[photo.display().to_string()]).unwrap();
-        let taught = sdg_grasp::TaughtDemonstration::new(&demonstrations[0]).unwrap().marks.width_px;
+        let marks = photo.with_extension("json");
+        let demonstration = sdg_inputs::demonstrations::read_pair(&photo, &marks).unwrap();
+        let taught = sdg_grasp::TaughtDemonstration::new(&demonstration).unwrap().marks.width_px;
         assert_eq!((on_the_page, taught), (40.0, 40.0));
     }
 }

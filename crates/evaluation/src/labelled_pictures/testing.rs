@@ -1,0 +1,56 @@
+//! Runs a model on all pictures of a folder.
+
+use anyhow::Result;
+use sdg_cell::{CellError, Perception};
+use sdg_grasp::{GraspError, Verification};
+
+use super::folder::LabelledFolder;
+use super::page::in_words;
+use super::picture::LeftOut;
+use super::score::{Tested, judge};
+use crate::progress::Progress;
+
+/// The pictures of a folder with their detections.
+#[derive(Debug)]
+pub struct TestedFolder {
+    pub tested: Vec<Tested>,
+    /// Files of the folder that are left out.
+    pub left_out: Vec<LeftOut>,
+    /// Number of instances with labels of other objects.
+    pub others: usize,
+}
+
+impl LabelledFolder {
+    /// Searches the pictures in order. Pictures that are not of the size for the model's region are left out.
+    /// `min_score` is for the progress.
+    ///
+    /// # Errors
+    /// A picture cannot be read, or detection fails.
+    pub fn test(
+        self,
+        detector: &Perception,
+        verification: Verification,
+        min_score: f64,
+        progress: &dyn Progress,
+    ) -> Result<TestedFolder> {
+        let Self { pictures, mut left_out, others } = self;
+        progress.expect(pictures.len());
+        let mut tested = Vec::with_capacity(pictures.len());
+        for picture in pictures {
+            let name = picture.name();
+            let of_picture = match Tested::detect(picture, detector, verification) {
+                Ok(of_picture) => of_picture,
+                // The model's region is for pictures of a different size.
+                Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
+                    left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let judged = judge(&of_picture, min_score);
+            progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
+            tested.push(of_picture);
+        }
+        Ok(TestedFolder { tested, left_out, others })
+    }
+}

@@ -1,0 +1,101 @@
+//! Teaches parts that the store does not contain yet, and runs their models on each other's photos.
+
+use std::ops::ControlFlow;
+
+use anyhow::Result;
+use image::RgbImage;
+use sdg_grasp::TeachOptions;
+use serde_json::{Value, json};
+
+use super::cross_check::CrossCheck;
+use super::findings::Findings;
+use super::folder::PartDemonstrations;
+use super::part_store::{PartOutcome, PartRecord, PartStore};
+use super::teach::teach_part;
+use crate::progress::Progress;
+
+/// Parts by name with the outcomes of their teaching.
+pub type PartOutcomes = Vec<(String, PartOutcome)>;
+
+/// The inputs that all parts have in common.
+pub struct PartTeaching<'a> {
+    pub store: &'a PartStore,
+    /// The options, with the initial weights.
+    pub options: &'a TeachOptions,
+    /// The SHA-256 of the file of the initial weights, if a file is given.
+    pub weights_sha256: Option<&'a str>,
+    /// Prefixes of the parameters that are initialised randomly in spite of that file.
+    pub reinitialized: &'a [String],
+}
+
+impl PartTeaching<'_> {
+    /// Teaches the parts that have no model from these inputs yet. If interrupted, breaks with the next
+    /// part's name.
+    ///
+    /// # Errors
+    /// Files cannot be read or written. A part that cannot be taught is an outcome.
+    pub fn run(
+        &self,
+        parts: &[&PartDemonstrations],
+        is_interrupted: &dyn Fn() -> bool,
+        progress: &dyn Progress,
+    ) -> Result<ControlFlow<String, PartOutcomes>> {
+        let mut outcomes = Vec::with_capacity(parts.len());
+        for part in parts {
+            let key = self.key(part)?;
+            let outcome = match self.store.read(&part.name, &key)? {
+                Some(outcome) => outcome,
+                None => {
+                    let Some((model, outcome)) = teach_part(part, self.options, is_interrupted) else {
+                        return Ok(ControlFlow::Break(part.name.clone()));
+                    };
+                    self.store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
+                    outcome
+                }
+            };
+            progress.unit_done(&format!("teach {}: {}", part.name, outcome.in_words()));
+            outcomes.push((part.name.clone(), outcome));
+        }
+        Ok(ControlFlow::Continue(outcomes))
+    }
+
+    /// The inputs that a part's model depends on.
+    fn key(&self, part: &PartDemonstrations) -> Result<Value> {
+        let options = self.options;
+        Ok(json!({
+            "files": part.sha256()?,
+            "model": options.kind,
+            "preset": options.preset.name(),
+            "seed": options.seed,
+            "steps": options.steps,
+            "time_budget": options.time_budget.map(|budget| budget.as_secs_f64()),
+            "symmetry": part.symmetry.unwrap_or(options.symmetry),
+            "size_tolerance": [options.size_tolerance.start(), options.size_tolerance.end()],
+            "base_weights_sha256": self.weights_sha256,
+            "reinit": self.reinitialized,
+            "version": env!("CARGO_PKG_VERSION"),
+        }))
+    }
+
+    /// Runs the model of each taught part on the first photos of all taught parts. Returns the findings and the photos.
+    ///
+    /// # Errors
+    /// Photos or models cannot be read, or detection fails.
+    pub fn check(
+        &self,
+        parts: &[&PartDemonstrations],
+        outcomes: PartOutcomes,
+        left_out: Vec<(String, String)>,
+        progress: &dyn Progress,
+    ) -> Result<(Findings, Vec<RgbImage>)> {
+        let is_taught = |name: &str| {
+            outcomes.iter().any(|(known, outcome)| known == name && matches!(outcome, PartOutcome::Taught { .. }))
+        };
+        let taught: Vec<_> = parts.iter().filter(|part| is_taught(&part.name)).collect();
+        let names: Vec<&str> = taught.iter().map(|part| part.name.as_str()).collect();
+        let photos: Vec<RgbImage> = taught.iter().map(|part| part.first_photo()).collect::<Result<_>>()?;
+        let done = |name: &str| progress.unit_done(&format!("{name}: run on {} photos", photos.len()));
+        let check = CrossCheck::run(self.store, &names, &photos, &done)?;
+        Ok((Findings::new(outcomes, check, left_out), photos))
+    }
+}

@@ -1,0 +1,78 @@
+//! A camera file that gets new intrinsics.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow};
+use sdg_calibration::CalibratedCamera;
+use sdg_geometry::PinholeCamera;
+
+use crate::camera_files::MAX_BYTES;
+
+/// Name of a camera in a new file.
+const DEFAULT_NAME: &str = "camera";
+
+/// The file to write. Comments and unknown fields of an existing file are kept.
+#[derive(Debug, Clone)]
+pub struct CameraUpdate {
+    path: PathBuf,
+    existing: String,
+    old: Option<CalibratedCamera>,
+}
+
+impl CameraUpdate {
+    /// Checks, before minutes of work, that the file can be written, and updated if it exists. The file is not
+    /// registered as an input: it is read again when it is written.
+    ///
+    /// # Errors
+    /// The file cannot be written, or does not have a camera file's layout.
+    pub fn check(path: &Path) -> Result<()> {
+        sdg_files::check_writable(path)?;
+        let Ok(text) = fs::read_to_string(path) else { return Ok(()) };
+        let any = without_pose(DEFAULT_NAME.to_owned(), PinholeCamera::symmetric(640, 480, 500.0));
+        if !text.trim().is_empty() {
+            any.update_yaml(&text).with_context(|| path.display().to_string())?;
+        }
+        Ok(())
+    }
+
+    /// Reads the existing file.
+    ///
+    /// # Errors
+    /// The file cannot be read or is not text, or is an input of this process.
+    pub fn read(path: &Path) -> Result<Self> {
+        // The board and the pictures are inputs, which must not be replaced; the camera file itself may be updated.
+        sdg_files::check_writable(path)?;
+        let existing = match fs::exists(path) {
+            Ok(true) => String::from_utf8(sdg_files::read(path, MAX_BYTES)?)
+                .map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))?,
+            _ => String::new(),
+        };
+        Ok(Self { path: path.to_owned(), old: CalibratedCamera::from_yaml(&existing).ok(), existing })
+    }
+
+    /// Whether the existing file contains a pose, which was measured with the old intrinsics and is removed.
+    pub fn removes_pose(&self) -> bool {
+        self.old.as_ref().is_some_and(|old| old.table.is_some() || old.flange_from_camera.is_some())
+    }
+
+    /// Writes the file. Without a `name`, the existing name is kept.
+    ///
+    /// # Errors
+    /// The existing file cannot be updated, or the file cannot be written.
+    pub fn write(self, intrinsics: PinholeCamera, name: Option<String>) -> Result<()> {
+        let Self { path, existing, old } = self;
+        let name = name.or(old.map(|old| old.name)).unwrap_or_else(|| DEFAULT_NAME.to_owned());
+        let camera = without_pose(name, intrinsics);
+        let text = if existing.trim().is_empty() {
+            camera.to_yaml()
+        } else {
+            camera.update_yaml(&existing).with_context(|| path.display().to_string())?
+        };
+        Ok(sdg_files::extend(&path, Some(&path), text.as_bytes())?)
+    }
+}
+
+fn without_pose(name: String, intrinsics: PinholeCamera) -> CalibratedCamera {
+    CalibratedCamera { name, intrinsics, table: None, flange_from_camera: None }
+}

@@ -1,0 +1,103 @@
+//! Opens a session of the page on a user's files. The files that the page writes are locked against other processes.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Result, anyhow};
+use sdg_annotate::{LiveOptions, Session, SessionOptions};
+use sdg_files::{FileError, WriterLock};
+use sdg_inputs::{UNREADABLE_EXTENSIONS, one_line};
+
+use crate::teacher::PageTeacher;
+
+/// Name of a project's file in its folder.
+const PROJECT_FILE: &str = "sdg-project.json";
+
+/// Opens the files of a session, and then its camera with `open_camera`. `photo_path` is the photo to be taken.
+/// `report` is given a line for each picture to try that cannot be read.
+///
+/// Everything is checked here, so that an error does not come after minutes of marking.
+///
+/// # Errors
+/// A file cannot be read or written, or is open in another process; a photo of a calibrated camera is stored rotated;
+/// the errors of `open_camera`.
+pub fn open_session(
+    teacher: &PageTeacher,
+    options: SessionOptions,
+    photo_path: Option<&Path>,
+    open_camera: impl FnOnce() -> Result<Option<LiveOptions>>,
+    report: &mut dyn FnMut(&str),
+) -> Result<Session> {
+    let images = &options.images;
+    for written in images.first().map(|(image, _)| image.as_path()).into_iter().chain(photo_path) {
+        sdg_files::check_writable(&written.with_extension("json"))?;
+    }
+    if let Some(out) = &options.model_path {
+        sdg_files::check_writable(out)?;
+    }
+    let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
+    let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
+    let project_file = match (&options.project, images.first()) {
+        (Some(folder), _) => Some(folder.join(PROJECT_FILE)),
+        (None, Some((photo, _))) => Some(sdg_annotate::project_of_photo(photo)?),
+        (None, None) => None,
+    };
+    let locks = lock_all(marks.chain(photo).chain(project_file))?;
+    for folder in options.trial_pictures.iter().filter(|path| path.is_dir()) {
+        for path in sdg_files::entries(folder)? {
+            // Other files beside the pictures are expected and not reported, but unreadable pictures are.
+            if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
+                let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
+                report(&format!("left out: {why}"));
+            }
+        }
+    }
+    if teacher.camera.is_some() {
+        let photos = images.iter().map(|(photo, _)| photo).filter(|photo| photo.exists());
+        photos.into_iter().try_for_each(|photo| sdg_inputs::check_is_not_turned(photo))?;
+    }
+    let live = open_camera()?;
+    open(teacher, SessionOptions { live, ..options }, locks)
+}
+
+/// Opens a project chosen on the page: a folder or a photo.
+///
+/// # Errors
+/// A file cannot be read or written, or is open in another process.
+pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
+    let is_folder = path.is_dir();
+    let written = if is_folder { path.join(PROJECT_FILE) } else { sdg_annotate::project_of_photo(path)? };
+    sdg_files::check_writable(&written)?;
+    let marks = (!is_folder).then(|| path.with_extension("json"));
+    let locks = lock_all(marks.into_iter().chain([written]))?;
+    let options = SessionOptions {
+        images: if is_folder { Vec::new() } else { vec![(path.to_owned(), None)] },
+        project: is_folder.then(|| path.to_owned()),
+        ..SessionOptions::default()
+    };
+    open(teacher, options, locks)
+}
+
+fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
+    let options = SessionOptions { max_opening_px: teacher.max_opening_px(), ..options };
+    Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
+}
+
+/// Locks files against other processes, each once. Files in a folder that is not writable are not locked.
+fn lock_all(written: impl Iterator<Item = PathBuf>) -> Result<Vec<WriterLock>> {
+    let written: BTreeSet<PathBuf> = written.collect();
+    let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
+    Ok(locks.into_iter().flatten().collect())
+}
+
+/// Locks a file against other processes; `None` if the folder is not writable.
+fn lock(written: &Path) -> Result<Option<WriterLock>> {
+    WriterLock::take(written).map_err(|error| match error {
+        FileError::Held { path, holder } => anyhow!(
+            "{}: another `sdg annotate` ({holder}) is editing these marks; continue on its page, or stop it first",
+            path.display()
+        ),
+        error => error.into(),
+    })
+}
