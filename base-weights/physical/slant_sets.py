@@ -1,8 +1,8 @@
 """Warps a set of pictures to the views of a camera that has moved around the middle of each scene, and its truth with them.
 
-usage: slant_sets.py SET OUT TILT_DEG [--seed 1]
+usage: slant_sets.py SET OUT TILT_DEG [--seed 1] [--lens-deg 49]
 
-SET has demo.*, truth.json and pictures, as shared/real and shared/physical. The table is taken as a plane, the lens as 49 degrees
+SET has demo.*, truth.json and pictures, as shared/real and shared/physical. The table is taken as a plane. The lens sees this angle
 across the longer side. The azimuth of each picture follows from the seed and the picture's name, and is the same at every tilt.
 """
 import argparse
@@ -15,12 +15,10 @@ import shutil
 import cv2
 import numpy
 
-LENS_DEG = 49.0
 
-
-def homography(width, height, tilt, azimuth):
+def homography(width, height, lens, tilt, azimuth):
     """From level to slanted positions, in pixels."""
-    focal = 0.5 * max(width, height) / math.tan(math.radians(LENS_DEG / 2))
+    focal = 0.5 * max(width, height) / math.tan(lens / 2)
     c, s = math.cos(azimuth), math.sin(azimuth)
     along = numpy.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     slanted = numpy.array([[math.cos(tilt), 0, 0], [0, 1, 0], [math.sin(tilt) / focal, 0, 1]])
@@ -55,6 +53,7 @@ def main():
     args.add_argument("out", type=pathlib.Path)
     args.add_argument("tilt_deg", type=float)
     args.add_argument("--seed", type=int, default=1)
+    args.add_argument("--lens-deg", type=float, default=49.0)
     args = args.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     for file in args.set.glob("demo.*"):
@@ -64,7 +63,7 @@ def main():
         picture = cv2.imread(str(args.set / entry["image"]))
         height, width = picture.shape[:2]
         azimuth = random.Random(f"{args.seed} {entry['image']}").uniform(0, 2 * math.pi)
-        matrix = homography(width, height, math.radians(args.tilt_deg), azimuth)
+        matrix = homography(width, height, math.radians(args.lens_deg), math.radians(args.tilt_deg), azimuth)
         warped = cv2.warpPerspective(picture, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE)
         cv2.imwrite(str(args.out / entry["image"]), warped)
         entry["instances"] = [warp_instance(matrix, instance) for instance in entry.get("instances") or []]

@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2};
-use sdg_cell::{CameraPose, ModelFinder, MountedCamera};
+use sdg_cell::{CameraPose, ModelFinder, MountedCamera, part_shape};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::collision::Obstacle;
@@ -21,7 +21,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::views::base_from_look_camera;
 use sdg_simulation::{
-    AttemptConfig, AttemptErrors, AttemptReport, RecordConfig, SimulationError, Workcell, WorkcellConfig, part_shape,
+    AttemptConfig, AttemptErrors, AttemptReport, RecordConfig, SimulationError, Workcell, WorkcellConfig,
 };
 use serde::{Deserialize, Serialize};
 
@@ -178,7 +178,7 @@ impl Rehearsal<'_> {
     /// # Errors
     /// A cell is too small; the error names the first one and a sufficient pitch.
     pub fn check_room(&self) -> Result<()> {
-        let part = part_shape(self.object)?;
+        let Some(part) = part_shape(&self.told_model(1)?) else { return Ok(()) };
         for number in 1..=self.attempts as usize {
             if let Some((goal, placing)) = self.placing(number)? {
                 goal.check_room(&part, placing.symmetry, placing.release_margin_m)?;
@@ -203,8 +203,9 @@ impl Rehearsal<'_> {
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
         let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
-        let part = Some(part_shape(self.object)?);
-        let grasp = GraspConfig { obstacles: obstacles.clone(), part, ..GraspConfig::default() };
+        // What a robot knows of the part, it knows from the model.
+        let model = self.told_model(number)?;
+        let grasp = GraspConfig { obstacles: obstacles.clone(), part: part_shape(&model), ..GraspConfig::default() };
         let mut workcell = Workcell::new(&WorkcellConfig {
             errors,
             wrist_camera: self.camera,
@@ -216,8 +217,7 @@ impl Rehearsal<'_> {
             pose: CameraPose::OnFlange(workcell.told_flange_from_camera()),
             table_height_m: 0.0,
         };
-        let mut finder =
-            ModelFinder::new(self.told_model(number)?, camera, SimulatedPictures).with_verification(self.verification);
+        let mut finder = ModelFinder::new(model, camera, SimulatedPictures).with_verification(self.verification);
         let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut finder, &config, seed) {
@@ -241,7 +241,7 @@ impl Rehearsal<'_> {
         let Some(RehearsedPlace { place, cell, .. }) = &self.place else { return Ok(None) };
         let in_turn = (number as u32 - 1) % place.num_cells() + 1;
         let goal = place.goal(cell.unwrap_or(in_turn))?;
-        Ok(Some((goal, PlacingConfig { symmetry: self.object.symmetry, ..PlacingConfig::default() })))
+        Ok(Some((goal, PlacingConfig { symmetry: self.model.facts().symmetry, ..PlacingConfig::default() })))
     }
 
     /// The model with the lengths that the robot uses in an attempt, including the error of the marks' height.
