@@ -56,7 +56,7 @@ impl DetectionWords<'_> {
     }
 
     /// Position, angle and width of the grasp in pixels, and also in millimetres if the camera is known.
-    pub fn place(&self, found: &Found) -> String {
+    pub fn position(&self, found: &Found) -> String {
         let grasp = found.detection.grasp;
         let metric = found.pose.zip(self.detector.frame()).map(|(pose, frame)| {
             let name = frame.name();
