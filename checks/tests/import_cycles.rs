@@ -14,17 +14,20 @@ fn root() -> PathBuf {
 fn crate_folders() -> Vec<String> {
     let crates = fs::read_dir(root().join("crates")).unwrap();
     let names = crates.map(|entry| format!("crates/{}", entry.unwrap().file_name().to_string_lossy()));
-    let others = ["base-weights", "benches", "checks", "tests", "weights-conversion"].map(str::to_owned);
-    names.chain(others).collect()
+    let others =
+        ["base-weights", "benches", "checks", "fuzz", "python", "tests", "tests/endurance", "weights-conversion"];
+    names.chain(others.map(str::to_owned)).collect()
 }
 
-/// Sources of crates and examples with their graphs.
+/// Sources of crates, tests and examples with their graphs.
 fn graphs() -> Vec<(String, ModuleGraph)> {
     let mut graphs = Vec::new();
     for folder in crate_folders() {
-        let src = root().join(&folder).join("src");
-        if src.is_dir() {
-            graphs.push((format!("{folder}/src"), ModuleGraph::read(&src).unwrap()));
+        for part in ["src", "tests"] {
+            let sources = root().join(&folder).join(part);
+            if sources.is_dir() {
+                graphs.push((format!("{folder}/{part}"), ModuleGraph::read(&sources).unwrap()));
+            }
         }
         for example in fs::read_dir(root().join(&folder).join("examples")).into_iter().flatten() {
             let path = example.unwrap().path();

@@ -45,7 +45,7 @@ pub enum Error {
     #[error("expected a version of the model numbered below {count}, found {id}")]
     NoSuchVersion { id: usize, count: usize },
     /// A file is not a project's file.
-    #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
+    #[error("{}: expected a project's file as the annotation page writes it, found {found}", path.display())]
     Project { path: PathBuf, found: String },
     /// The file of the page's token contains no valid token.
     #[error(

@@ -47,7 +47,7 @@ impl Refusal {
             Self::Origin => Response::plain(403, "this server answers its own page only\n"),
             Self::Token => Response::plain(
                 401,
-                "open the address that `sdg annotate` printed: it contains the token of this page\n",
+                "open the address that was printed at the start: it contains the token of this page\n",
             ),
         }
     }

@@ -48,7 +48,7 @@ pub enum CameraFileError {
     #[error("expected {name} to be {expected}, found {found:?}")]
     Pose { name: String, expected: &'static str, found: Vec<f64> },
     /// The file has no pose above the table.
-    #[error("expected the camera's pose above the table (`table:`), found none; `sdg camera table` measures it")]
+    #[error("expected the camera's pose above the table (`table:`), found none")]
     NoPose,
     /// The camera's height is impossible.
     #[error("expected the camera 0.05 to 20 m above the table, found {height:.2} m{hint}")]
@@ -96,8 +96,8 @@ pub enum CalibrationError {
         "expected {columns} x {rows} squares that fit on {paper}: at most {fits_mm:.1} mm each, found {square_mm:.1} mm"
     )]
     Paper { paper: &'static str, columns: u32, rows: u32, square_mm: f64, fits_mm: f64 },
-    /// The file was not written by `sdg camera board`.
-    #[error("expected a board as `sdg camera board` writes it, found a file without the size of its squares")]
+    /// The file is not one of this crate's sheets.
+    #[error("expected a board's file with the size of its squares, found a file without it")]
     NoBoardFile,
     /// The picture has no grid of corners.
     #[error(
@@ -115,8 +115,8 @@ pub enum CalibrationError {
     /// The placement of the grid on the board is unknown, or the grid's corners are not those of a board.
     #[error(
         "expected enough of the board to identify the visible squares, found {corners} corners and no position on the \
-         board that matches its dots: show more of it, or print it with `sdg camera board`; a checkerboard without \
-         dots must be completely visible"
+         board that matches its dots: show more of it, or print it with its dots; a checkerboard without dots \
+         must be completely visible"
     )]
     BoardUnclear { corners: usize },
     /// A checkerboard without dots has a different number of squares, or is not completely visible.

@@ -231,10 +231,10 @@ impl<P> ModelFinder<P> {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
-        let mut place = self.camera.over_table(&arm.geometry().base_from_flange(&state.q));
-        place.table_height_m += higher_m;
-        self.perception.move_to(&place)?;
-        let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
+        let mut camera_over_table = self.camera.over_table(&arm.geometry().base_from_flange(&state.q));
+        camera_over_table.table_height_m += higher_m;
+        self.perception.move_to(&camera_over_table)?;
+        let distance_m = camera_over_table.camera.world_from_camera.translation.z - self.marks_z_m(&camera_over_table);
         self.perception.set_sizes(heights_m.map(|heights_m| {
             // A higher part is nearer to the camera and appears larger.
             let size =
@@ -243,31 +243,32 @@ impl<P> ModelFinder<P> {
             (low * (1.0 - SIZE_LEEWAY)).clamp(0.5, 1.0)..=(high * (1.0 + SIZE_LEEWAY)).clamp(1.0, 2.0)
         }))?;
         let found = self.perception.detect(&picture, self.verification)?;
-        self.seen = found.first().and_then(|best| self.outline_of(best, &place));
-        let sightings = found.iter().filter_map(|found| self.sighting(found, &place)).collect();
+        self.seen = found.first().and_then(|best| self.outline_of(best, &camera_over_table));
+        let sightings = found.iter().filter_map(|found| self.sighting(found, &camera_over_table)).collect();
         self.last = Some((picture, found));
         Ok(sightings)
     }
 
     /// z of the marks of a part that lies on the table, in metres.
-    fn marks_z_m(&self, place: &CameraOverTable) -> f64 {
-        place.table_height_m + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
+    fn marks_z_m(&self, camera_over_table: &CameraOverTable) -> f64 {
+        camera_over_table.table_height_m
+            + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
     }
 
     /// Converts a detection to a sighting in the plane of the marks.
-    fn sighting(&self, found: &Found, place: &CameraOverTable) -> Option<Sighting> {
+    fn sighting(&self, found: &Found, camera_over_table: &CameraOverTable) -> Option<Sighting> {
         let target = target(found)?;
-        let marks_z_m = self.marks_z_m(place);
+        let marks_z_m = self.marks_z_m(camera_over_table);
         let seen_middle = found.detection.outline.as_ref().map(Polygon::centroid);
         let middle_m = match seen_middle {
-            Some(pixel) => place.camera.at_height(&pixel, marks_z_m)?,
+            Some(pixel) => camera_over_table.camera.at_height(&pixel, marks_z_m)?,
             None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
         };
         let pose = found.pose?;
         // The part's visible side walls shift its pose equally in all pictures: this error is not noise.
         let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
         Some(Sighting {
-            camera_m: place.camera.world_from_camera.translation.vector.into(),
+            camera_m: camera_over_table.camera.world_from_camera.translation.vector.into(),
             middle_m,
             place_sigma_m: noise_m / SIGMAS_OF_RADIUS,
             size: self.size_of(found),
@@ -289,10 +290,10 @@ impl<P> ModelFinder<P> {
         is_one_size.then_some(found.pose?.opening_m * pixels_per_m / width_px)
     }
 
-    fn outline_of(&self, found: &Found, place: &CameraOverTable) -> Option<SeenOutline> {
-        let table_m = place.table_height_m;
-        let mark_m = self.marks_z_m(place);
-        let on_plane = |pixel| place.camera.at_height(pixel, mark_m).map(|p_in_base| p_in_base.xy());
+    fn outline_of(&self, found: &Found, camera_over_table: &CameraOverTable) -> Option<SeenOutline> {
+        let table_m = camera_over_table.table_height_m;
+        let mark_m = self.marks_z_m(camera_over_table);
+        let on_plane = |pixel| camera_over_table.camera.at_height(pixel, mark_m).map(|p_in_base| p_in_base.xy());
         let corners = &found.detection.outline.as_ref()?.vertices;
         let outline_in_base = corners.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
         Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
@@ -300,15 +301,19 @@ impl<P> ModelFinder<P> {
 
     /// Keeps the last picture and the outlines of its parts.
     fn keep_views(&mut self, sightings: &[Sighting]) {
-        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.camera_over_table()) else { return };
+        let (Some((picture, found)), Some(camera_over_table)) = (&self.last, self.perception.camera_over_table())
+        else {
+            return;
+        };
         let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
         let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
-            let on_plane = |pixel| place.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());
+            let on_plane =
+                |pixel| camera_over_table.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());
             let vertices = outline?.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
             Some((*sighting, Polygon { vertices }))
         });
         let parts = parts.collect();
-        self.sights.push(Sights { picture: PosedPicture::new(picture, place.camera), parts });
+        self.sights.push(Sights { picture: PosedPicture::new(picture, camera_over_table.camera), parts });
     }
 
     /// Measures the height of the surface beside a part in two of the kept pictures.

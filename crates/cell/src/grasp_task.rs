@@ -71,7 +71,10 @@ impl GraspTask {
     /// The errors of [`PlaceGoal::check_room`].
     pub fn check_room(&self) -> Result<()> {
         match (&self.place, &self.config.part) {
-            (Some((goal, placing)), Some(part)) => goal.check_room(part, placing.symmetry, placing.release_margin_m),
+            (Some((goal, placing)), Some(part)) => {
+                let hand = self.workcell.robot.geometry().hand;
+                goal.check_room(part, placing.symmetry, placing.release_margin_m, &hand)
+            }
             _ => Ok(()),
         }
     }

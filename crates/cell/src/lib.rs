@@ -30,10 +30,14 @@ mod workcell_map;
 
 // Crates whose types are in this crate's interface, so that a program needs only this dependency.
 pub use image;
+pub use nalgebra;
 pub use sdg_calibration as calibration;
+pub use sdg_camera as camera;
 pub use sdg_demonstration as demonstration;
 pub use sdg_geometry as geometry;
 pub use sdg_grasp as grasp;
+pub use sdg_kinematics as kinematics;
+pub use sdg_robot as robot;
 
 pub use board_drawing::draw_board_session;
 pub use drawing::DEFAULT_MIN_SCORE;

@@ -47,8 +47,9 @@ pub struct Found {
 /// The file has no pose of the camera.
 pub fn camera_over_table(camera: &CalibratedCamera) -> std::result::Result<(CameraOverTable, Frame), CameraFileError> {
     let (posed, table) = camera.posed()?;
-    let place = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
-    Ok((place, table.frame))
+    let camera_over_table =
+        CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
+    Ok((camera_over_table, table.frame))
 }
 
 impl Perception {
@@ -63,8 +64,11 @@ impl Perception {
     /// # Errors
     /// The model was taught without a camera, the camera does not see the plane of the marks, or the model's region is
     /// not inside the camera's pictures.
-    pub fn over_table(model: GraspModel, place: &CameraOverTable) -> Result<Self> {
-        Ok(Self { view: View::OverTable(Box::new(PlanViewDetector::new(model, place)?), *place), frame: None })
+    pub fn over_table(model: GraspModel, camera_over_table: &CameraOverTable) -> Result<Self> {
+        Ok(Self {
+            view: View::OverTable(Box::new(PlanViewDetector::new(model, camera_over_table)?), *camera_over_table),
+            frame: None,
+        })
     }
 
     /// Like [`Self::over_table`], with the pose in the camera file.
@@ -72,20 +76,20 @@ impl Perception {
     /// # Errors
     /// The errors of [`Self::over_table`]; or the file has no pose of the camera.
     pub fn calibrated(model: GraspModel, camera: &CalibratedCamera) -> Result<Self> {
-        let (place, frame) = camera_over_table(camera)?;
-        Ok(Self { frame: Some(frame), ..Self::over_table(model, &place)? })
+        let (camera_over_table, frame) = camera_over_table(camera)?;
+        Ok(Self { frame: Some(frame), ..Self::over_table(model, &camera_over_table)? })
     }
 
     /// Changes the pose of the camera, or the camera.
     ///
     /// # Errors
     /// The errors of [`Self::over_table`]; the pose is then unchanged.
-    pub fn move_to(&mut self, place: &CameraOverTable) -> Result<()> {
+    pub fn move_to(&mut self, camera_over_table: &CameraOverTable) -> Result<()> {
         match &mut self.view {
-            View::AnyCamera(model) => *self = Self::over_table(GraspModel::clone(model), place)?,
+            View::AnyCamera(model) => *self = Self::over_table(GraspModel::clone(model), camera_over_table)?,
             View::OverTable(detector, at) => {
-                detector.move_to(place)?;
-                *at = *place;
+                detector.move_to(camera_over_table)?;
+                *at = *camera_over_table;
             }
         }
         Ok(())
@@ -156,8 +160,8 @@ impl Perception {
     }
 
     fn check_size(&self, picture: &RgbImage) -> Result<()> {
-        let View::OverTable(_, place) = &self.view else { return Ok(()) };
-        let PinholeCamera { width, height, .. } = place.camera.intrinsics;
+        let View::OverTable(_, camera_over_table) = &self.view else { return Ok(()) };
+        let PinholeCamera { width, height, .. } = camera_over_table.camera.intrinsics;
         let (found_width, found_height) = picture.dimensions();
         if (found_width, found_height) == (width, height) {
             return Ok(());
@@ -169,13 +173,15 @@ impl Perception {
     pub fn camera_over_table(&self) -> Option<&CameraOverTable> {
         match &self.view {
             View::AnyCamera(_) => None,
-            View::OverTable(_, place) => Some(place),
+            View::OverTable(_, camera_over_table) => Some(camera_over_table),
         }
     }
 
     /// Width and height of the calibrated camera's pictures.
     pub fn picture_size(&self) -> Option<[u32; 2]> {
-        self.camera_over_table().map(|place| [place.camera.intrinsics.width, place.camera.intrinsics.height])
+        self.camera_over_table().map(|camera_over_table| {
+            [camera_over_table.camera.intrinsics.width, camera_over_table.camera.intrinsics.height]
+        })
     }
 
     /// Orientation of the pictures: a calibration refers to the sensor's pixels.

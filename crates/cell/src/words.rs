@@ -25,7 +25,7 @@ pub fn advice_in_words(advice: Advice, demonstration: &str, on_size: &str) -> St
         Advice::DarkerPhoto => light("darker"),
         Advice::BrighterPhoto => light("brighter"),
         Advice::Uncover => format!("if it is the part, uncover it, or add a {demonstration} taken from this side"),
-        _ => format!("if it is the part, a second {demonstration} taken from this side would help"),
+        Advice::OtherSide => format!("if it is the part, a second {demonstration} taken from this side would help"),
     }
 }
 
@@ -56,7 +56,7 @@ impl DetectionWords<'_> {
     }
 
     /// Position, angle and width of the grasp in pixels, and also in millimetres if the camera is known.
-    pub fn place(&self, found: &Found) -> String {
+    pub fn position(&self, found: &Found) -> String {
         let grasp = found.detection.grasp;
         let metric = found.pose.zip(self.detector.frame()).map(|(pose, frame)| {
             let name = frame.name();

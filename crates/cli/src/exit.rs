@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io;
 
-use sdg_calibration::CalibrationError;
+use sdg_calibration::{CalibrationError, CameraFileError};
 use sdg_cell::CellError;
 use sdg_evaluation::EvaluationError;
 use sdg_grasp::{GraspError, RegionError};
@@ -83,7 +83,7 @@ pub fn one_line(error: &anyhow::Error) -> String {
     }
 }
 
-/// The option that corrects a library's error, since libraries do not know options.
+/// The option or command that corrects a library's error, since libraries know neither.
 fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     let of_model = |error: &GraspError| match error {
         GraspError::Region(RegionError::OtherPicture { .. }) => Some(
@@ -93,8 +93,14 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         GraspError::BackendNotBuilt { asked, .. } => Some(format!("build sdg-cli with --features {asked}")),
         _ => None,
     };
+    let of_camera = |error: &CameraFileError| {
+        matches!(error, CameraFileError::NoPose).then(|| "sdg camera table measures it".to_owned())
+    };
     if let Some(error) = cause.downcast_ref() {
         return of_model(error);
+    }
+    if let Some(error) = cause.downcast_ref() {
+        return of_camera(error);
     }
     if let Some(error) = cause.downcast_ref() {
         return match error {
@@ -111,6 +117,8 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             CalibrationError::OtherCheckerboard { .. } => {
                 Some("give its squares with --squares, or show the whole board".to_owned())
             }
+            CalibrationError::NoBoardFile => Some("sdg camera board writes one".to_owned()),
+            CalibrationError::BoardUnclear { .. } => Some("sdg camera board prints one with dots".to_owned()),
             CalibrationError::OtherBoard { .. } => Some("give its squares with --squares".to_owned()),
             CalibrationError::HandEyeDisagrees { is_other_mount: true, .. } => {
                 Some("choose the other one with --mount".to_owned())
@@ -127,11 +135,13 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     }
     match cause.downcast_ref() {
         Some(CellError::Grasp(error)) => of_model(error),
+        Some(CellError::Camera(error)) => of_camera(error),
         Some(CellError::NotOnHand) => Some("sdg camera hand-eye --mount hand measures it".to_owned()),
         Some(CellError::NotInBase) => {
             Some("sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it".to_owned())
         }
         _ => match cause.downcast_ref() {
+            Some(RobotError::Latched(_)) => Some("sdg robot recover recovers it".to_owned()),
             Some(RobotError::NoRealTime { .. }) => Some("--no-realtime does without".to_owned()),
             _ => None,
         },

@@ -39,7 +39,7 @@ impl FoundText<'_> {
         format!(
             "{} at {}; score {:.2} ({}; turn by {}){refused}{touching}",
             self.paint.text(tone, "grasp"),
-            self.words.place(found),
+            self.words.position(found),
             detection.score,
             self.words.measured(detection),
             detection.turn_source.name(),

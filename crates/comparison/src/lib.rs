@@ -47,5 +47,5 @@ mod view;
 pub use alignment::Alignment;
 pub use config::{ComparisonConfig, ComparisonError};
 pub use network::{Comparison, ComparisonNetwork};
-pub use sdg_orientation::Pyramid;
+pub use sdg_picture::Pyramid;
 pub use view::{DIFFERENCES, Reference, View};

@@ -226,7 +226,7 @@ mod tests {
     use image::{Rgb, RgbImage};
     use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
     use sdg_layers::state_dict;
-    use sdg_orientation::Pyramid;
+    use sdg_picture::Pyramid;
 
     fn view(reference: &Reference, tx: f64) -> View {
         let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));

@@ -6,7 +6,7 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_orientation::{CropWindow, OUTSIDE, Pyramid};
+use sdg_picture::{CropWindow, OUTSIDE, Pyramid};
 
 use crate::config::ComparisonConfig;
 

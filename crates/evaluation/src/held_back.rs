@@ -78,16 +78,17 @@ impl HeldBackFigures {
     /// Samples cannot be made, or detection fails.
     pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
         // The part may be anywhere in a sample.
-        let model = &model.clone().with_region(None)?;
+        let detector = Perception::of_any_camera(model.clone().with_region(None)?);
+        let model = detector.model();
         let facts = model.facts();
         let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
         let (alone, others_in_photo) = without_unmarked_parts(model, demonstrations)?;
         let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
-        let detector = Perception::of_any_camera(model.clone());
         let judged = (0..COUNT).into_par_iter().map(|number| {
             let sample = samples.sample(number);
-            let detections = model.detect(&sample.image, Verification::ByShape)?;
+            let found = detector.detect(&sample.image, Verification::ByShape)?;
+            let detections = found.into_iter().map(|found| found.detection).collect();
             let of_label = |labelled: LabelledInstance| {
                 let LabelledInstance { annotation, optional, .. } = labelled;
                 Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }

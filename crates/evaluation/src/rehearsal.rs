@@ -13,6 +13,7 @@ use nalgebra::{Isometry3, Point2};
 use sdg_cell::{CameraPose, ModelFinder, MountedCamera, part_shape};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
+use sdg_kinematics::ArmGeometry;
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::workcell::Workcell as WorkcellFile;
@@ -179,9 +180,11 @@ impl Rehearsal<'_> {
     /// A cell is too small; the error names the first one and a sufficient pitch.
     pub fn check_room(&self) -> Result<()> {
         let Some(part) = part_shape(&self.told_model(1)?) else { return Ok(()) };
+        // The simulator's arm.
+        let hand = ArmGeometry::panda().hand;
         for number in 1..=self.attempts as usize {
             if let Some((goal, placing)) = self.placing(number)? {
-                goal.check_room(&part, placing.symmetry, placing.release_margin_m)?;
+                goal.check_room(&part, placing.symmetry, placing.release_margin_m, &hand)?;
             }
         }
         Ok(())

@@ -84,7 +84,6 @@ impl EvidenceKind {
 /// The advice for a refused detection that is the part after all; the caller puts it into words, with the names of its
 /// options or buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Advice {
     /// A wider size tolerance or, with a calibrated camera, a check of the camera file and of the height of the marks.
     CheckSize,

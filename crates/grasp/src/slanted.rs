@@ -10,7 +10,7 @@
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
-use sdg_shape::{PlanMap, parallel};
+use sdg_shape::{PlanViewMap, parallel};
 
 use crate::detection::{Found, GraspDetection};
 use crate::sighting::Sighting;
@@ -184,7 +184,7 @@ impl LevelImage {
         let size = [picture.width(), picture.height()];
         let level_size = [largest.x - least.x, largest.y - least.y].map(|side| side.ceil().max(1.0) as u32);
         let made = Self { image: RgbImage::default(), slant: *slant, size, taken: *taken, middle: -least };
-        let image = PlanMap::of(level_size, |level| made.point(&level)).resample(picture);
+        let image = PlanViewMap::of(level_size, |level| made.point(&level)).resample(picture);
         Self { image, ..made }
     }
 

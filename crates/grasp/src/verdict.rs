@@ -111,13 +111,26 @@ impl Contributions {
         // Outside this range of brightness the light differs. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
+        let on_light = if light < DARKER {
+            Some(Advice::DarkerPhoto)
+        } else if light > BRIGHTER {
+            Some(Advice::BrighterPhoto)
+        } else {
+            None
+        };
         match self.strongest_objection()? {
             EvidenceKind::Size => Some(Advice::CheckSize),
             EvidenceKind::Outside | EvidenceKind::Network | EvidenceKind::Resemblance => None,
-            _ if light < DARKER => Some(Advice::DarkerPhoto),
-            _ if light > BRIGHTER => Some(Advice::BrighterPhoto),
-            EvidenceKind::Visible => Some(Advice::Uncover),
-            _ => Some(Advice::OtherSide),
+            EvidenceKind::Visible => on_light.or(Some(Advice::Uncover)),
+            EvidenceKind::Edges
+            | EvidenceKind::Surface
+            | EvidenceKind::Hue
+            | EvidenceKind::Likeness
+            | EvidenceKind::Details
+            | EvidenceKind::Table
+            | EvidenceKind::Rim
+            | EvidenceKind::Added
+            | EvidenceKind::Mirror => on_light.or(Some(Advice::OtherSide)),
         }
     }
 }

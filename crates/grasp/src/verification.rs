@@ -13,7 +13,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_orientation::halved;
+use sdg_picture::halved;
 use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Match, Picture, TableColors, parallel};
 
 use crate::colors::Colors;

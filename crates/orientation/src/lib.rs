@@ -32,16 +32,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod angle_classes;
+mod box_crop;
 mod config;
-mod crop;
 mod error;
 mod network;
-mod pyramid;
 
 pub use angle_classes::{AngleClasses, AngleReading, Labels};
+pub use box_crop::crop_for;
 pub use config::{OrientationConfig, Readout};
-pub use crop::{CropWindow, OUTSIDE, crop_for};
 pub use error::{OrientationError, Result, check_setting};
 pub use network::{OrientationCnn, crop_batch};
-pub use pyramid::{Pyramid, halved};
 pub use sdg_layers::state_dict::{ImportReport, StateDict, WeightTensor};

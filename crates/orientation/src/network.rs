@@ -10,10 +10,10 @@ use image::RgbImage;
 use image::imageops::{rotate90, rotate180, rotate270};
 use sdg_layers::state_dict::{self, ImportReport, StateDict};
 use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
+use sdg_picture::OUTSIDE;
 
 use crate::angle_classes::AngleReading;
 use crate::config::OrientationConfig;
-use crate::crop::OUTSIDE;
 use crate::error::{OrientationError, Result};
 
 /// Grey values per unit of the network's input: about the standard deviation of photos.

@@ -32,7 +32,7 @@ pub enum RobotError {
     #[error("the arm stopped itself: {0}")]
     Reflex(String),
     /// The arm does not move until it is recovered from an earlier error.
-    #[error("nothing moves until a person has checked the arm and runs `sdg robot recover`: {0}")]
+    #[error("nothing moves until a person has checked the arm and recovers it: {0}")]
     Latched(String),
     /// Arm or hand never answered.
     #[error("{peer} could not be reached: {why}")]

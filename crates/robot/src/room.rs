@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3};
 use sdg_geometry::{Polygon, RotationalSymmetry};
-use sdg_kinematics::{FINGER_HALF_WIDTH_M, HAND_OPENING_MAX_M, finger_thickness_m};
+use sdg_kinematics::{FINGER_HALF_WIDTH_M, HandGeometry, finger_thickness_m};
 
 use crate::error::{Result, RobotError};
 use crate::part_shape::PartShape;
@@ -47,18 +47,24 @@ pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
 }
 
 /// Opening of the hand that releases a part, m.
-pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64) -> f64 {
-    (width_m + release_margin_m).min(HAND_OPENING_MAX_M)
+pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64, hand: &HandGeometry) -> f64 {
+    (width_m + release_margin_m).min(hand.opening_max_m)
 }
 
 impl PlaceGoal {
     /// Checks that parts in the neighbouring cells leave room for this part, and at some angle of its symmetry for
-    /// fingers that open `release_margin_m` wider than the part (m).
+    /// fingers of `hand` that open `release_margin_m` wider than the part (m).
     ///
     /// # Errors
     /// [`RobotError::Configuration`] without that room; the error contains the reason and a sufficient pitch.
-    pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
-        let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
+    pub fn check_room(
+        &self,
+        part: &PartShape,
+        symmetry: RotationalSymmetry,
+        release_margin_m: f64,
+        hand: &HandGeometry,
+    ) -> Result<()> {
+        let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m, hand);
         let turns_rad = same_turns_rad(symmetry);
         let Some(why) = self.lacks_room(part, &turns_rad, opening_m) else { return Ok(()) };
         let pitch_m = self.tray.as_ref().map_or([0.0; 2], |tray| tray.pitch_m);

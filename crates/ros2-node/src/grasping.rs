@@ -24,7 +24,7 @@ const PICTURE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The inputs of a grasp in addition to arm and model.
 #[derive(Debug, Clone)]
-pub struct GraspSettings {
+pub struct GraspInputs {
     /// The workcell, with the limits of motions.
     pub workcell: Workcell,
     /// The camera of the pictures.
@@ -66,7 +66,7 @@ type Ended = (TrajectoryArm, GraspResponse, Option<String>);
 
 /// The arm, and a running grasp.
 pub(super) struct Grasping {
-    settings: Arc<GraspSettings>,
+    settings: Arc<GraspInputs>,
     pictures: TopicPictures,
     is_interrupted: IsInterrupted,
     arm: Option<TrajectoryArm>,
@@ -77,7 +77,7 @@ pub(super) struct Grasping {
 
 impl Grasping {
     pub(super) fn new(
-        settings: GraspSettings,
+        settings: GraspInputs,
         arm: TrajectoryArm,
         pictures: Arc<Shared>,
         is_interrupted: &IsInterrupted,
@@ -148,7 +148,7 @@ impl Grasping {
 }
 
 fn grasped(
-    settings: &GraspSettings,
+    settings: &GraspInputs,
     config: &GraspConfig,
     arm: &mut TrajectoryArm,
     finder: &mut ModelFinder<TopicPictures>,
@@ -189,7 +189,7 @@ fn watch(is_interrupted: &IsInterrupted) -> Watch {
 
 /// Plans the grasp without moving, from the arm's current posture.
 fn planned(
-    settings: &GraspSettings,
+    settings: &GraspInputs,
     config: &GraspConfig,
     arm: &mut TrajectoryArm,
     finder: &mut ModelFinder<TopicPictures>,
@@ -221,7 +221,7 @@ fn planned(
     }
 }
 
-fn pose(settings: &GraspSettings, target: Option<&GraspTarget>) -> PoseStamped {
+fn pose(settings: &GraspInputs, target: Option<&GraspTarget>) -> PoseStamped {
     let header = Header { stamp: Time::from_system(SystemTime::now()), frame_id: settings.base_frame.clone() };
     let pose = target.map(|target| target.base_from_tcp.into()).unwrap_or_default();
     PoseStamped { header, pose }

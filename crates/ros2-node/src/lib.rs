@@ -7,7 +7,7 @@
 //! ```
 //!
 //! This crate parses no arguments and reads no files other than the taught model. Settings are passed as [`Settings`]
-//! and [`GraspSettings`], and teaching as a function of a [`TeachJob`], so that the node teaches in the same way as its
+//! and [`GraspInputs`], and teaching as a function of a [`TeachJob`], so that the node teaches in the same way as its
 //! caller.
 //!
 //! Without the feature `dds` the crate is empty, so that a build of the whole workspace does not compile RustDDS.
@@ -32,7 +32,7 @@ use anyhow::Result;
 use sdg_ros2::dds::{Node, TrajectoryArm};
 
 pub use camera_pose::CameraPoseSource;
-pub use grasping::GraspSettings;
+pub use grasping::GraspInputs;
 pub use settings::{IsInterrupted, Settings};
 pub use teaching::{Teach, TeachJob};
 
@@ -55,7 +55,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 pub fn run(
     mut node: Node,
     settings: Settings,
-    arm: Option<(GraspSettings, TrajectoryArm)>,
+    arm: Option<(GraspInputs, TrajectoryArm)>,
     is_interrupted: &IsInterrupted,
 ) -> Result<()> {
     let lines = Arc::<Lines>::default();

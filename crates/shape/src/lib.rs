@@ -34,7 +34,7 @@
 //! | likeness | log-odds of a small network that photo and picture show the same part |
 //! | details | log-odds of a second network, trained on parts and their look-alikes |
 //!
-//! This crate plans no grasp; only [`PlanMap`] uses a camera. Parts lie flat: poses are rotations, shifts and scales in
+//! This crate plans no grasp; only [`PlanViewMap`] uses a camera. Parts lie flat: poses are rotations, shifts and scales in
 //! the image plane. The crate uses threads only with the feature `parallel`, and results do not depend on them.
 //!
 //! # Example
@@ -90,7 +90,7 @@ mod layers;
 mod likeness;
 pub mod parallel;
 mod pixel_cell;
-mod plan_map;
+mod plan_view_map;
 mod pose;
 mod profile;
 mod refinement;
@@ -113,7 +113,7 @@ pub use foreshortening::Foreshortening;
 pub use gradient_field::GradientField;
 pub use layers::Layer;
 pub use likeness::{LAYERS, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
-pub use plan_map::{PixelRect, PlanMap};
+pub use plan_view_map::{PixelRect, PlanViewMap};
 pub use refinement::Refinement;
 pub use revolution::Revolution;
 pub use search::{Match, SearchConfig, ShapeSearch};

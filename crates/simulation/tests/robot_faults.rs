@@ -111,7 +111,7 @@ fn a_program_that_starts_anew_finds_the_arm_in_reflex() {
     run(&mut Robot::new(&mut cell, Workcell::safety_limits(), Watch::default())).unwrap_err();
     let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
     let error = run(&mut robot).unwrap_err().to_string();
-    assert!(error.contains("sdg robot recover") && error.contains("in reflex"), "{error}");
+    assert!(error.contains("a person has checked the arm and recovers it") && error.contains("in reflex"), "{error}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use sdg_bindings::{Camera, Model, PixelOrder, PixelShape, RegionChoice, Tracker,
 use sdg_grasp::{Device, Verification};
 use sdg_web::Detector;
 
-use super::file;
+use super::bytes::file;
 use super::numbers::Numbers;
 use crate::target::Target;
 

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use sdg_camera::{MjpegServer, OpenOptions, Url, read_pictures};
 
+use super::bytes::{SEED_PORT, contains, replaced, split_at_marks};
 use super::pictures::{encoded, picture};
-use super::{SEED_PORT, contains, replaced, split_at_marks};
 use crate::target::Target;
 
 /// Separates the answers of one input; each goes to a connection of its own.

@@ -2,7 +2,7 @@
 
 use sdg_demonstration::{Annotation, ImageFacts, LabelFile};
 
-use super::file;
+use super::bytes::file;
 use crate::target::Target;
 
 const FORMATS: &str = "crates/demonstration/tests/formats";

@@ -5,7 +5,7 @@ use sdg_grasp::{BaseWeightsFile, Device, GraspModel, summarize};
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Source};
 
-use super::file;
+use super::bytes::file;
 use crate::target::Target;
 
 const FIXTURES: &str = "weights-conversion/tests/fixtures";

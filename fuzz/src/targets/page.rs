@@ -14,9 +14,9 @@ use sdg_annotate::{
 };
 use sdg_demonstration::Demonstration;
 
+use super::bytes::{SEED_PORT, contains, replaced, split_at_marks};
 use super::cameras::exchange;
 use super::pictures::{encoded, picture};
-use super::{SEED_PORT, contains, replaced, split_at_marks};
 use crate::target::Target;
 
 /// The page's key in the seeds.

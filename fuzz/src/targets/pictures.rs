@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{ImageFormat, Rgb, RgbImage};
 use sdg_picture::{ImageLimits, JpegScanner, PixelFrame, PpmHead, decode_image_in, is_turned_by_exif};
 
-use super::file;
+use super::bytes::file;
 use crate::target::Target;
 
 /// A small limit, so that a header cannot request much memory: the program's own limit is

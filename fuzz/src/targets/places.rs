@@ -3,7 +3,7 @@
 use sdg_calibration::{CalibratedCamera, read_robot_poses};
 use sdg_robot::workcell::Workcell;
 
-use super::file;
+use super::bytes::file;
 use crate::target::Target;
 
 const MAX_EXTRA_BYTES: usize = 16 << 20;

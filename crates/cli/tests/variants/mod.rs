@@ -43,16 +43,9 @@ const MIN_LOSSLESS: usize = 200;
 const TAUGHT_EACH: usize = 19;
 const DEFAULT_SEED: u64 = 1;
 const SEED_VARIABLE: &str = "SDG_VARIANTS_SEED";
-/// Name of a photo in the folder that the marks may refer to instead.
-const OTHER_PHOTO: &str = "other photo.png";
 
 fn scene() -> &'static Scene {
     static SCENE: LazyLock<Scene> = LazyLock::new(|| Scene::new([165.0, 118.0], 25.0, 5));
-    &SCENE
-}
-
-fn other_scene() -> &'static Scene {
-    static SCENE: LazyLock<Scene> = LazyLock::new(|| Scene::new([120.0, 150.0], -70.0, 9));
     &SCENE
 }
 
@@ -133,7 +126,7 @@ impl Variant {
             fs::write(at(name), bytes).unwrap();
         }
         if self.kind == Kind::WrongMarks {
-            other_scene().photo.save(at(OTHER_PHOTO)).unwrap();
+            wrong_marks::other_scene().photo.save(at(wrong_marks::OTHER_PHOTO)).unwrap();
         }
         let path = |name: &str| if self.is_relative { format!("./{name}") } else { at(name).display().to_string() };
         let sdg = |arguments: &[&str]| -> Output {

@@ -1,5 +1,7 @@
 //! Faulty marks, each with words of which the error must contain one.
 
+use std::sync::LazyLock;
+
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
@@ -9,6 +11,15 @@ use super::picture::pick;
 use super::scene::Scene;
 
 type Words = &'static [&'static str];
+
+/// Name of a photo in the folder that the marks may refer to instead.
+pub(super) const OTHER_PHOTO: &str = "other photo.png";
+
+/// The scene in that photo.
+pub(super) fn other_scene() -> &'static Scene {
+    static SCENE: LazyLock<Scene> = LazyLock::new(|| Scene::new([120.0, 150.0], -70.0, 9));
+    &SCENE
+}
 
 /// The scene with moved marks; the photo is unchanged.
 fn mapped(scene: &Scene, map: impl Fn([f64; 2]) -> [f64; 2]) -> Scene {
@@ -167,8 +178,8 @@ fn contradictory(dice: &mut Pcg64Mcg, scene: &Scene, photo: &str) -> (Marks, Wor
         }
         _ => {
             // The other photo in the folder shows the part at these marks.
-            file = sizeless(coco(dice, super::other_scene(), super::OTHER_PHOTO).0);
-            file["images"] = json!([{"id": file["images"][0]["id"], "file_name": super::OTHER_PHOTO}]);
+            file = sizeless(coco(dice, other_scene(), OTHER_PHOTO).0);
+            file["images"] = json!([{"id": file["images"][0]["id"], "file_name": OTHER_PHOTO}]);
             file["annotations"].as_array_mut().unwrap().retain(|one| one.get("area").is_some());
             file["annotations"][0]["image_id"] = file["images"][0]["id"].clone();
             ("marks of another existing photo", &["file_name", "another photo"])

@@ -5,9 +5,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
-use sdg_grasp::{
-    CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above, teach,
-};
+use sdg_grasp::{CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above};
 use sdg_inputs::one_line;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::views::demonstration_view;
@@ -19,6 +17,7 @@ use super::one_unit::caught;
 use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::shipped;
+use crate::taught_file::TaughtFile;
 
 /// The settings for teaching networks.
 pub(super) struct Teaching<'a> {
@@ -67,13 +66,12 @@ impl Teaching<'_> {
             interrupted |= is_interrupted();
             if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let taught = caught(|| Ok(teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
+        let file = caught(|| Ok(TaughtFile::teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
         if interrupted {
             return Ok(None);
         }
-        let (record, summary) = match taught {
-            Ok(taught) => {
-                let bytes = taught.model.to_bytes()?;
+        let (record, summary) = match file {
+            Ok(TaughtFile { taught, bytes, .. }) => {
                 // The record is written last, because it states that the model is complete.
                 self.store.write_bytes(&cell.model_file(marks), &bytes)?;
                 let facts = taught.model.facts().clone();

@@ -196,14 +196,6 @@ impl Robot {
         self.set(&Request::SetNeToEe(*ne_from_ee))
     }
 
-    /// Sets the frame of external forces and Cartesian stiffness, relative to the end effector.
-    ///
-    /// # Errors
-    /// [`FciError::Refused`] and the errors of the connection.
-    pub fn set_stiffness_frame(&mut self, ee_from_stiffness: &Transform) -> Result<()> {
-        self.set(&Request::SetEeToStiffness(*ee_from_stiffness))
-    }
-
     fn set(&mut self, request: &Request) -> Result<()> {
         let timeout = self.session.timeout();
         self.execute(request, Some(timeout))

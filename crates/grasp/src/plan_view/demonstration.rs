@@ -4,9 +4,9 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
-use sdg_shape::PlanMap;
+use sdg_shape::PlanViewMap;
 
-use super::region::RegionInPlan;
+use super::region::RegionInPlanView;
 use super::{CameraOverTable, Lengths, plan_view, slant};
 use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
@@ -35,7 +35,7 @@ pub fn seen_from_above(
     let slant = slant(&over_table.camera, &on_plane);
     let lengths = Lengths { pixels_per_m: 1.0 / length, mark_height_m, grasp_height_m, slant };
     let view = plan_view(over_table, &lengths)?;
-    let map = PlanMap::new(&over_table.camera, &view);
+    let map = PlanViewMap::new(&over_table.camera, &view);
     let made = demonstrations
         .iter()
         .map(|demonstration| {
@@ -57,7 +57,7 @@ pub fn pictures_from_above(
     over_table: &CameraOverTable,
     lengths: &Lengths,
 ) -> Result<Vec<RgbImage>> {
-    let map = PlanMap::new(&over_table.camera, &plan_view(over_table, lengths)?);
+    let map = PlanViewMap::new(&over_table.camera, &plan_view(over_table, lengths)?);
     Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
 }
 
@@ -82,7 +82,7 @@ pub fn check_region_from_above(
         taught.with_check(check)
     };
     let taught = demonstrations.iter().map(in_plan).collect::<Result<Vec<_>>>()?;
-    RegionInPlan::new(region, &over_table.camera, &view)?.window([view.width, view.height], &taught).map(|_| ())
+    RegionInPlanView::new(region, &over_table.camera, &view)?.window([view.width, view.height], &taught).map(|_| ())
 }
 
 fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Result<Annotation> {

@@ -18,10 +18,10 @@ use burn::tensor::read_sync;
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
-use sdg_shape::{PixelRect, PlanMap};
+use sdg_shape::{PixelRect, PlanViewMap};
 
 pub use self::demonstration::{check_region_from_above, pictures_from_above, seen_from_above};
-use self::region::RegionInPlan;
+use self::region::RegionInPlanView;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::detection::{Found, GraspDetection};
 use crate::error::{GraspError, Result};
@@ -84,8 +84,8 @@ pub struct PlanViewDetector {
     over_table: CameraOverTable,
     lengths: Lengths,
     view: PlanView,
-    map: PlanMap,
-    region: Option<RegionInPlan>,
+    map: PlanViewMap,
+    region: Option<RegionInPlanView>,
     /// The range of sizes relative to the part's size, if parts may lie at a height other than the table's.
     sizes: Option<RangeInclusive<f64>>,
 }
@@ -98,8 +98,9 @@ impl PlanViewDetector {
     pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
         let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
-        let map = PlanMap::new(&over_table.camera, &view);
-        let region = model.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
+        let map = PlanViewMap::new(&over_table.camera, &view);
+        let region =
+            model.region().map(|region| RegionInPlanView::new(region, &over_table.camera, &view)).transpose()?;
         // The model gets plan views, whose pixels are not those of the region.
         let model = model.with_region(None)?.of_known_size()?;
         Ok(Self { model, over_table: *over_table, lengths, view, map, region, sizes: None })
@@ -133,9 +134,10 @@ impl PlanViewDetector {
     /// A camera whose pictures do not show the plane, or not the searched region; the detector is then unchanged.
     pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
         let view = plan_view(over_table, &self.lengths)?;
-        let region = self.region().map(|region| RegionInPlan::new(region, &over_table.camera, &view)).transpose()?;
+        let region =
+            self.region().map(|region| RegionInPlanView::new(region, &over_table.camera, &view)).transpose()?;
         (self.view, self.region) = (view, region);
-        self.map = PlanMap::new(&over_table.camera, &self.view);
+        self.map = PlanViewMap::new(&over_table.camera, &self.view);
         self.over_table = *over_table;
         Ok(())
     }
@@ -146,7 +148,8 @@ impl PlanViewDetector {
     /// A region that extends beyond the camera's pictures or belongs to pictures of another size, that does not show
     /// the plane, or that is too small for the part; the detector is then unchanged.
     pub fn look_in(&mut self, region: Option<&SearchRegion>) -> Result<()> {
-        let region = region.map(|region| RegionInPlan::new(region, &self.over_table.camera, &self.view)).transpose()?;
+        let region =
+            region.map(|region| RegionInPlanView::new(region, &self.over_table.camera, &self.view)).transpose()?;
         if let Some(region) = &region {
             region.window([self.view.width, self.view.height], self.model.demonstrations())?;
         }
@@ -199,8 +202,9 @@ impl PlanViewDetector {
 
     /// Whether a detection in the plan view lies in the searched region of the picture; always true for whole pictures.
     pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
-        let has =
-            |region: &RegionInPlan| self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region));
+        let has = |region: &RegionInPlanView| {
+            self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region))
+        };
         self.region.as_ref().is_none_or(has)
     }
 

@@ -13,14 +13,14 @@ const POINTS_A_SIDE: u32 = 16;
 
 /// A region of the picture, and its bounding box in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RegionInPlan {
+pub(super) struct RegionInPlanView {
     /// The region in pixels of the picture.
     pub(super) region: SearchRegion,
     /// The bounding box in pixels of the plan view.
     bounds: BoundingBox,
 }
 
-impl RegionInPlan {
+impl RegionInPlanView {
     /// Finds the bounds of a region of the pictures in the plan view.
     ///
     /// # Errors

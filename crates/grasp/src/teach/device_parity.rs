@@ -8,7 +8,7 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::golden::{record, verify};
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
-use super::tests::{demonstration, small_plan, taught};
+use super::tests::{demonstration, small_teaching, taught};
 use super::*;
 use crate::check_config::CheckConfig;
 use crate::detection::GraspDetection;
@@ -132,7 +132,7 @@ fn teaching_goes_the_same_way() {
         let taught = teach_network(
             &[demonstration()],
             &[demonstration()],
-            &small_plan(&options),
+            &small_teaching(&options),
             &options,
             &mut |event| {
                 if let TeachingEvent::Step { record, .. } = event {

@@ -10,18 +10,18 @@
 //! ```
 
 mod absent;
-mod detector_plan;
+mod detector_teaching;
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
 mod event;
 mod fine_tuning;
 mod held_back;
 pub(crate) mod negatives;
+mod network_teaching;
 mod options;
 mod orientation;
 mod other_parts;
 mod paper;
-mod plan;
 mod preset;
 mod r50;
 mod side_by_side;
@@ -58,9 +58,9 @@ pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
 use negatives::NegativeScenes;
+pub(crate) use network_teaching::NetworkTeaching;
+use network_teaching::ReadingTeaching;
 pub use options::TeachOptions;
-pub(crate) use plan::Plan;
-use plan::ReadingPlan;
 pub use preset::Preset;
 use side_by_side::side_by_side;
 pub use start::Start;
@@ -100,8 +100,8 @@ pub fn teach(
     let options = options.with_start_read()?;
     let mut by_search = without_network(demonstrations, &options)?;
     let (alone, _) = without_unmarked_parts(&by_search, demonstrations)?;
-    let mut taught = match Plan::new(&options) {
-        Some(plan) => teach_network(demonstrations, &alone, &plan, &options, observe, start)?,
+    let mut taught = match NetworkTeaching::new(&options) {
+        Some(teaching) => teach_network(demonstrations, &alone, &teaching, &options, observe, start)?,
         None => {
             by_search.score_calibration.resemblance =
                 NegativeScenes::new(&alone, options.seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?
@@ -225,49 +225,49 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions) -> 
 /// Number of windows from which the last layers of our base weights are computed before training.
 const NUM_VIEWS: usize = 64;
 
-/// Teaches a model with a network by a plan. Samples are made from `alone`, the photos of the demonstrations without
+/// Teaches a model with a network. Samples are made from `alone`, the photos of the demonstrations without
 /// unmarked parts.
 pub(crate) fn teach_network(
     demonstrations: &[Demonstration],
     alone: &[Demonstration],
-    plan: &Plan,
+    teaching: &NetworkTeaching,
     options: &TeachOptions,
     observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
     start: Instant,
 ) -> Result<Taught> {
     let taught = taught(demonstrations, options)?;
     // The base weights are applied first, so that an error in them appears at once instead of after minutes.
-    let detector = plan.detector.initial(options.start.weights(), &options.device, options.seed)?;
+    let detector = teaching.detector.initial(options.start.weights(), &options.device, options.seed)?;
     let comparison = match options.start.weights() {
         Some(base_weights) => base_weights.comparison(&options.device)?,
         None => None,
     };
     let mut orientation_facts = None;
-    let reading = match &plan.reading {
-        ReadingPlan::BoxAndCrop(orientation_plan) => {
-            let (network, facts) = orientation::teach(alone, orientation_plan, options, observe)?;
+    let reading = match &teaching.reading {
+        ReadingTeaching::BoxAndCrop(orientation_teaching) => {
+            let (network, facts) = orientation::teach(alone, orientation_teaching, options, observe)?;
             orientation_facts = Some(facts);
             Reading::BoxAndCrop(Box::new(network))
         }
-        ReadingPlan::BoxAndKeypoints => Reading::BoxAndKeypoints,
-        ReadingPlan::Keypoints => Reading::Keypoints,
-        ReadingPlan::Mask => Reading::Mask(MaskMatcher::new(&taught)?),
+        ReadingTeaching::BoxAndKeypoints => Reading::BoxAndKeypoints,
+        ReadingTeaching::Keypoints => Reading::Keypoints,
+        ReadingTeaching::Mask => Reading::Mask(MaskMatcher::new(&taught)?),
     };
 
-    let augmenter = Augmenter::new(alone, plan.samples.clone(), options.seed)?;
-    let held_back_augmenter = Augmenter::new(alone, plan.held_back.clone(), options.seed)?;
-    let [to_learn, to_hold_back] = other_parts::draw(plan.num_other_parts, options.seed);
+    let augmenter = Augmenter::new(alone, teaching.samples.clone(), options.seed)?;
+    let held_back_augmenter = Augmenter::new(alone, teaching.held_back.clone(), options.seed)?;
+    let [to_learn, to_hold_back] = other_parts::draw(teaching.num_other_parts, options.seed);
     let augmenter = augmenter.with_other_parts(&to_learn)?;
     let held_back_augmenter = held_back_augmenter.with_other_parts(&to_hold_back)?;
     let turns = HiddenTurns::new(alone, options.symmetry);
-    let numbers: Vec<u64> = (0..plan.training.validation.samples as u64).collect();
+    let numbers: Vec<u64> = (0..teaching.training.validation.samples as u64).collect();
     let held_back = side_by_side(&numbers, |&number| Ok(turns.canonical(held_back_augmenter.held_out(number))))?;
     let held_back = HeldBack { samples: &held_back, turns: &turns };
-    let mut training = plan.training.clone();
+    let mut training = teaching.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.saturating_sub(start.elapsed()));
 
-    let recurring = |i: u64| plan.distinct_samples.map_or(i, |distinct| i % distinct);
-    let windows = augmenter.windows(plan.detector.network.input.size_divisibility as u32);
+    let recurring = |i: u64| teaching.distinct_samples.map_or(i, |distinct| i % distinct);
+    let windows = augmenter.windows(teaching.detector.network.input.size_divisibility as u32);
     let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), options.seed);
     let source = SampleSource {
         frames: &|i| {
@@ -281,7 +281,7 @@ pub(crate) fn teach_network(
     };
     let detector = match options.start.weights() {
         Some(base_weights) if base_weights.is_ours() => {
-            let (images, targets) = first_windows(NUM_VIEWS, &plan.detector.network.input, &source)?;
+            let (images, targets) = first_windows(NUM_VIEWS, &teaching.detector.network.input, &source)?;
             base_weights.imprint(detector, &images, &targets)?
         }
         _ => detector,
@@ -289,7 +289,7 @@ pub(crate) fn teach_network(
     // The model that is validated, calibrated and returned equals the model read from its file, without the head that
     // exists only during teaching.
     let finished = |detector: &GeneralizedRcnn| -> Result<Network> {
-        let own = plan.detector.network.init(&options.device, options.seed)?;
+        let own = teaching.detector.network.init(&options.device, options.seed)?;
         let detector = state_dict::import(own, &state_dict::export(detector)).0;
         Ok(Network { detector, reading: reading.clone(), comparison: comparison.clone() }.rounded())
     };
@@ -318,7 +318,7 @@ pub(crate) fn teach_network(
     let calibrated =
         held_back.calibrate(network.usual_threshold(), proposals, &of_any_size, &on_other_parts.highest)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
-    if (hits as f64) < plan.min_hit_rate * positives as f64 {
+    if (hits as f64) < teaching.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
     let negatives = NegativeScenes::new(alone, options.seed, NUM_NEGATIVE_SCENES)?;

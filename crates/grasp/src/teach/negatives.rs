@@ -8,7 +8,7 @@
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
 };
-use sdg_orientation::halved;
+use sdg_picture::halved;
 
 use super::side_by_side::side_by_side;
 #[cfg(feature = "fitting")]

@@ -9,7 +9,7 @@ use sdg_training::orientation::{self, OrientationEvent};
 
 use super::event::TeachingEvent;
 use super::options::TeachOptions;
-use super::preset::OrientationPlan;
+use super::preset::OrientationTeaching;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::OrientationFacts;
@@ -20,27 +20,22 @@ const TIME_SHARE: f64 = 0.3;
 /// Teaches the orientation CNN from the demonstrations.
 pub(super) fn teach(
     demonstrations: &[Demonstration],
-    plan: &OrientationPlan,
+    teaching: &OrientationTeaching,
     options: &TeachOptions,
     observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
 ) -> Result<(OrientationCnn, OrientationFacts)> {
-    let mut training = plan.training.clone();
+    let mut training = teaching.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
     let start = options.start.weights().and_then(|weights| weights.orientation.as_ref());
     let taught =
-        orientation::teach(
-            demonstrations,
-            &plan.network,
-            start,
-            &training,
-            &options.device,
-            &mut |event| match *event {
+        orientation::teach(demonstrations, &teaching.network, start, &training, &options.device, &mut |event| {
+            match *event {
                 OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {
                     observe(&TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs })
                 }
                 _ => ControlFlow::Continue(()),
-            },
-        )?;
+            }
+        })?;
     if taught.ending == Ending::Interrupted {
         return Err(GraspError::StoppedTooEarly);
     }

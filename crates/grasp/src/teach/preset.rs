@@ -9,7 +9,7 @@ use sdg_orientation::OrientationConfig;
 use sdg_training::TrainingConfig;
 use sdg_training::orientation::OrientationTraining;
 
-use super::detector_plan::DetectorPlan;
+use super::detector_teaching::DetectorTeaching;
 use super::{paper, r50};
 use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
@@ -55,7 +55,7 @@ impl Preset {
     }
 
     /// The detector of a model, taught from given weights or from random values; `None` for model S, which has none.
-    pub(super) fn detector(self, kind: ModelKind, has_base_weights: bool) -> Option<DetectorPlan> {
+    pub(super) fn detector(self, kind: ModelKind, has_base_weights: bool) -> Option<DetectorTeaching> {
         let rcnn = models::rcnn_kind(kind)?;
         let network = match self {
             Self::Edge => presets::edge_of(rcnn),
@@ -65,7 +65,7 @@ impl Preset {
         };
         let teaches_keypoints = self == Self::Edge && !kind.has_keypoints();
         let keypoints = || presets::edge(NUM_KEYPOINTS).roi_heads.keypoint_head;
-        Some(DetectorPlan { network, auxiliary_keypoints: teaches_keypoints.then(keypoints).flatten() })
+        Some(DetectorTeaching { network, auxiliary_keypoints: teaches_keypoints.then(keypoints).flatten() })
     }
 
     pub(super) fn training(self, kind: ModelKind, seed: u64) -> TrainingConfig {
@@ -87,7 +87,7 @@ impl Preset {
         }
     }
 
-    pub(super) fn orientation(self, symmetry: RotationalSymmetry, seed: u64) -> OrientationPlan {
+    pub(super) fn orientation(self, symmetry: RotationalSymmetry, seed: u64) -> OrientationTeaching {
         let (network, mut training) = match self {
             Self::Edge | Self::R50Detectron2 | Self::R50Torchvision => {
                 (OrientationConfig::edge(), OrientationTraining::edge(seed))
@@ -103,7 +103,7 @@ impl Preset {
             }
             _ => 1,
         };
-        OrientationPlan { network: network.with_symmetry(fold), training }
+        OrientationTeaching { network: network.with_symmetry(fold), training }
     }
 }
 
@@ -120,7 +120,7 @@ impl FromStr for Preset {
 
 /// The orientation CNN and its training.
 #[derive(Debug, Clone)]
-pub(crate) struct OrientationPlan {
+pub(crate) struct OrientationTeaching {
     pub(crate) network: OrientationConfig,
     pub(crate) training: OrientationTraining,
 }

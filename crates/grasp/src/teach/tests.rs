@@ -11,8 +11,8 @@ use sdg_detection::config::{NormKind, RcnnConfig, ResizeRule};
 use sdg_geometry::{GraspLine, Polygon};
 use sdg_training::ValidationConfig;
 
-use super::plan::ReadingPlan;
-use super::preset::OrientationPlan;
+use super::network_teaching::ReadingTeaching;
+use super::preset::OrientationTeaching;
 use super::*;
 use crate::model::Verification;
 
@@ -57,28 +57,28 @@ fn shrink(network: &mut RcnnConfig) {
     }
 }
 
-fn whole_plan(options: &TeachOptions) -> Plan {
-    Plan::new(options).unwrap()
+fn whole_teaching(options: &TeachOptions) -> NetworkTeaching {
+    NetworkTeaching::new(options).unwrap()
 }
 
-/// A preset's plan, reduced for a test; it accepts any network.
-pub(super) fn small_plan(options: &TeachOptions) -> Plan {
-    let mut plan = whole_plan(options);
-    shrink(&mut plan.detector.network);
-    if let Some(head) = &mut plan.detector.auxiliary_keypoints {
+/// A preset's settings, reduced for a test; it accepts any network.
+pub(super) fn small_teaching(options: &TeachOptions) -> NetworkTeaching {
+    let mut teaching = whole_teaching(options);
+    shrink(&mut teaching.detector.network);
+    if let Some(head) = &mut teaching.detector.auxiliary_keypoints {
         head.conv_channels = SMALL_KEYPOINT_CONVS.to_vec();
     }
-    plan.min_hit_rate = 0.0;
-    plan.samples = plan.samples.with_output_size(96, 72);
-    plan.training.steps = STEPS;
-    plan.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
-    if let ReadingPlan::BoxAndCrop(orientation) = &mut plan.reading {
-        let OrientationPlan { network, training } = &mut **orientation;
+    teaching.min_hit_rate = 0.0;
+    teaching.samples = teaching.samples.with_output_size(96, 72);
+    teaching.training.steps = STEPS;
+    teaching.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
+    if let ReadingTeaching::BoxAndCrop(orientation) = &mut teaching.reading {
+        let OrientationTeaching { network, training } = &mut **orientation;
         network.input_px = 32;
         (network.stage_channels, network.stage_convs, network.hidden) = (vec![8, 16], vec![1, 1], 16);
         (training.steps, training.validation_crops) = (STEPS, 4);
     }
-    plan
+    teaching
 }
 
 pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
@@ -86,7 +86,7 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
     teach_network(
         &[demonstration()],
         &[demonstration()],
-        &small_plan(&options),
+        &small_teaching(&options),
         &options,
         &mut |_| ControlFlow::Continue(()),
         Instant::now(),
@@ -131,7 +131,7 @@ fn the_papers_protocol_teaches_every_network_model() {
     for (kind, [steps, batch_size], rate) in
         [(ModelKind::A, [500, 8], 0.005), (ModelKind::C, [1000, 2], 0.0008), (ModelKind::D, [1000, 2], 0.0008)]
     {
-        let whole = whole_plan(&TeachOptions { kind, preset: Preset::Paper, ..TeachOptions::new(1) });
+        let whole = whole_teaching(&TeachOptions { kind, preset: Preset::Paper, ..TeachOptions::new(1) });
         assert_eq!((whole.training.steps, whole.training.batch_size), (steps, batch_size));
         assert_eq!((whole.training.schedule.peak, whole.distinct_samples), (rate, Some(1500)));
         let model = taught(Preset::Paper, kind);
@@ -234,10 +234,10 @@ fn a_mark_that_a_model_needs_is_asked_for_by_name() {
 fn an_interrupt_before_there_is_a_network_leaves_nothing() {
     for (kind, reason) in [(ModelKind::A, "orientation CNN"), (ModelKind::D, "no model to keep")] {
         let options = TeachOptions { kind, ..TeachOptions::new(1) };
-        let plan = small_plan(&options);
+        let teaching = small_teaching(&options);
         let stop = &mut |_: &TeachingEvent| ControlFlow::Break(());
-        let refused =
-            teach_network(&[demonstration()], &[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
+        let refused = teach_network(&[demonstration()], &[demonstration()], &teaching, &options, stop, Instant::now())
+            .unwrap_err();
         assert!(refused.to_string().contains(reason), "{refused}");
     }
 }

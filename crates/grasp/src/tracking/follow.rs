@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
-use sdg_orientation::halved;
+use sdg_picture::halved;
 use sdg_shape::{CloseLook, Evidence, GradientField, Picture, PixelRect, Reach, TableColors};
 
 use super::detector::PartDetector;

@@ -1,6 +1,7 @@
 use super::*;
 use crate::place::{Place, PlaceKind};
 use nalgebra::Point2;
+use sdg_kinematics::ArmGeometry;
 
 /// Opening of the fingers beyond the part for releasing it, m.
 const MARGIN_M: f64 = 0.020;
@@ -26,7 +27,7 @@ fn bar() -> PartShape {
 
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
     // A cell with neighbours on all sides, in a rotated tray: the tray's own axes count.
-    tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M)
+    tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M, &ArmGeometry::panda().hand)
 }
 
 #[test]
@@ -88,10 +89,18 @@ fn a_tall_part_meets_the_thicker_root_of_the_fingers() {
 #[test]
 fn alone_there_is_always_room() {
     let single = Place { kind: PlaceKind::Pose, ..tray([1.0, 1.0], 0.0) };
-    single.goal(1).unwrap().check_room(&disc(0.07), RotationalSymmetry::None, MARGIN_M).unwrap();
+    single
+        .goal(1)
+        .unwrap()
+        .check_room(&disc(0.07), RotationalSymmetry::None, MARGIN_M, &ArmGeometry::panda().hand)
+        .unwrap();
     // A single row has no neighbours across.
     let kind = PlaceKind::Tray { cells: [3, 1], pitch_m: [0.1, 0.01] };
-    Place { kind, ..single }.goal(2).unwrap().check_room(&bar(), RotationalSymmetry::None, MARGIN_M).unwrap();
+    Place { kind, ..single }
+        .goal(2)
+        .unwrap()
+        .check_room(&bar(), RotationalSymmetry::None, MARGIN_M, &ArmGeometry::panda().hand)
+        .unwrap();
 }
 
 #[test]

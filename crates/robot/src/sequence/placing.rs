@@ -120,7 +120,7 @@ pub fn grasp_and_place<A: CompliantArm>(
 ) -> Result<PlacingReport> {
     placing.touch_down.validate()?;
     if let Some(part) = &config.part {
-        goal.check_room(part, placing.symmetry, placing.release_margin_m)?;
+        goal.check_room(part, placing.symmetry, placing.release_margin_m, &robot.geometry().hand)?;
     }
     let mut sequence = Sequence::yielding(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
@@ -150,7 +150,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
-        goal.check_room(&part, placing.symmetry, placing.release_margin_m)
+        goal.check_room(&part, placing.symmetry, placing.release_margin_m, &self.robot.geometry().hand)
             .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
         let taken = LyingPart { base_from_part: target.base_from_tcp, shape: part.clone() };
         self.known.lying.take(&target.base_from_tcp);
@@ -271,7 +271,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Opening of the hand that releases the held part, m.
     fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
-        release_opening_m(self.known.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
+        let width_m = self.known.closed.map_or(0.0, |hand| hand.opening_m);
+        release_opening_m(width_m, placing.release_margin_m, &self.robot.geometry().hand)
     }
 
     fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {

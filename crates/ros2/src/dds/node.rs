@@ -127,7 +127,7 @@ impl Node {
                 Ok(())
             }
             ParameterValue::Boolean(false) if name == "use_sim_time" => Ok(()),
-            _ => Err("it is set on the command line of sdg ros2".to_owned()),
+            _ => Err("it is set on the command line of the node".to_owned()),
         };
         options = options.parameter_validator(Box::new(is_fixed));
         let mut node = context.new_node(name, options).map_err(|error| network("node", error))?;

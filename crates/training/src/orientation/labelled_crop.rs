@@ -5,7 +5,7 @@ use nalgebra::{Point2, Rotation2};
 use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::SampleObject;
 use sdg_geometry::{Angle, BoundingBox};
-use sdg_orientation::CropWindow;
+use sdg_picture::CropWindow;
 
 use super::jitter::BoxJitter;
 
@@ -30,7 +30,7 @@ impl LabelledCrop {
         rng: &mut Pcg64Mcg,
     ) -> Option<Self> {
         let seen = jitter.apply(&box_in_turned_frame(object, turn, image)?, rng);
-        let straight = CropWindow::around(&seen).ok()?;
+        let straight = CropWindow::around(&seen)?;
         let window = CropWindow { center: image_from_turned(turn) * straight.center, turn, ..straight };
         let (start, end) = (object.keypoints.first()?.point(), object.keypoints.last()?.point());
         let direction = Angle::from_direction(end.x - start.x, end.y - start.y);

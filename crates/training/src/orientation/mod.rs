@@ -11,9 +11,10 @@
 //!
 //! # Measured
 //!
-//! `cargo run --release -p sdg-cli --example try_orientation -- pendulum,fuel_line 20 9000 edge,steps=60 edge,steps=120
-//! edge edge,labels=hard,window=0`: 96 held-out scenes, 20 rendered pictures (12 in the row of 120 steps of the
-//! pendulum) with three boxes each, box errors of up to 6 % in position and 12 % in size.
+//! With the arguments `pendulum,fuel_line 20 9000 edge,steps=60 edge,steps=120 edge edge,labels=hard,window=0` of the
+//! example crates/cli/examples/try_orientation.rs, which is in the history until commit b1519834: 96 held-out scenes, 20
+//! rendered pictures (12 in the row of 120 steps of the pendulum) with three boxes each, box errors of up to 6 % in
+//! position and 12 % in size.
 //!
 //! | part | settings | held-out: within 10°, median | rendered: within 10°, median, worst |
 //! |---|---|---|---|

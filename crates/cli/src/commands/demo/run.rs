@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use anyhow::Result;
+use sdg_evaluation::TaughtFile;
 use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors};
 use sdg_evaluation::run_page::{self, RunPage, TaughtHere};
 use sdg_evaluation::shipped;
 use sdg_evaluation::trial::try_views;
 use sdg_files::write_atomically;
-use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
+use sdg_grasp::{CheckConfig, TeachOptions, Verification};
 
 use super::DemoArgs;
 use crate::commands::rehearse::{finish, show_attempt};
@@ -37,15 +38,16 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     options.time_budget = args.time_budget.map(Duration::from_secs_f64);
     options.symmetry = object.symmetry;
     let mut progress = TeachingProgress::new(interrupt.clone());
-    let taught = teach(std::slice::from_ref(&demonstration), &options, &mut |event| progress.show(event));
+    let file = TaughtFile::teach(std::slice::from_ref(&demonstration), &options, &mut |event| progress.show(event));
     progress.finish();
-    let taught = taught?;
+    // The model as read from its file is tested and rehearsed, because a person will use the file.
+    let TaughtFile { taught, bytes, model } = file?;
     let model_file = args.out.join(format!("{}.sdg", object.name));
-    write_atomically(&model_file, &taught.model.to_bytes()?)?;
-    eprintln!("taught in {:.0} s; the model is {}", taught.model.facts().seconds, model_file.display());
+    write_atomically(&model_file, &bytes)?;
+    eprintln!("taught in {:.0} s; the model is {}", model.facts().seconds, model_file.display());
 
-    let mut trials = try_views(&taught.model, &object, true, VIEWS.0, VIEWS_SEED, Verification::ByShape)?;
-    trials.extend(try_views(&taught.model, &object, false, VIEWS.1, VIEWS_SEED, Verification::ByShape)?);
+    let mut trials = try_views(&model, &object, true, VIEWS.0, VIEWS_SEED, Verification::ByShape)?;
+    trials.extend(try_views(&model, &object, false, VIEWS.1, VIEWS_SEED, Verification::ByShape)?);
     eprintln!(
         "tested on unseen pictures: correct in {} of {} with the part, {} false alarms in {} without",
         trials.iter().filter(|trial| trial.is_right()).count(),
@@ -55,7 +57,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     );
 
     let rehearsal = Rehearsal {
-        model: &taught.model,
+        model: &model,
         object: &object,
         attempts: args.attempts,
         seed: args.seed,
@@ -66,7 +68,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     };
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);
-    let page = RunPage { model: &taught.model, object: &object, rehearsed: &rehearsed, command: &command };
+    let page = RunPage { model: &model, object: &object, rehearsed: &rehearsed, command: &command };
     let taught_here = TaughtHere {
         demonstration: &demonstration,
         history: taught.history.as_ref(),
@@ -74,5 +76,5 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
         seed: args.seed,
     };
     let report = run_page::demo(&page, &taught_here)?.write(&args.out)?;
-    finish(&page, Some(taught.model.facts().seconds), &report, args.json)
+    finish(&page, Some(model.facts().seconds), &report, args.json)
 }

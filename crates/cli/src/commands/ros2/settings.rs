@@ -7,7 +7,7 @@ use sdg_grasp::GraspError;
 use sdg_inputs::camera_files::{self, CameraFile};
 use sdg_inputs::{read_model, read_workcell};
 use sdg_ros2::dds::Qos;
-use sdg_ros2_node::{CameraPoseSource, GraspSettings, Settings};
+use sdg_ros2_node::{CameraPoseSource, GraspInputs, Settings};
 
 use super::args::Ros2Args;
 use super::teaching::{teach, trigger_job};
@@ -74,7 +74,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
 ///
 /// # Errors
 /// A file cannot be used.
-pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
+pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspInputs> {
     let needed = |option: &str| Usage(format!("--allow-motion: expected {option} FILE"));
     let workcell_path = args.arm.workcell.as_ref().ok_or_else(|| needed("--workcell"))?;
     let (workcell, camera_of_workcell) = read_workcell(workcell_path)?;
@@ -84,5 +84,5 @@ pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
     let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
     let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
     let told = args.arm.height.told(workcell.table_height_m);
-    Ok(GraspSettings { workcell, camera, told, speed: args.arm.speed, base_frame })
+    Ok(GraspInputs { workcell, camera, told, speed: args.arm.speed, base_frame })
 }

@@ -34,7 +34,7 @@ pub use page::page;
 pub use paired::PairedCounts;
 pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
 pub use selection::{GraspCondition, Selection};
-pub use settings::{AxisSettings, GraspSettings};
+pub use settings::{AttemptSettings, AxisSettings};
 pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
 };

@@ -25,7 +25,7 @@ impl AxisSettings {
 
 /// The settings that determine attempts under errors, besides the error, model and part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct GraspSettings {
+pub struct AttemptSettings {
     /// Version of the errors and their sizes; raised when they change.
     pub errors: u32,
     /// How the models were taught.
@@ -37,7 +37,7 @@ pub struct GraspSettings {
     pub search_points: Option<u32>,
 }
 
-impl GraspSettings {
+impl AttemptSettings {
     /// The current version of the errors.
     pub const ERRORS: u32 = 1;
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::records::{Answer, AxisRecord};
 use super::selection::GraspCondition;
-use super::settings::{AxisSettings, GraspSettings};
+use super::settings::{AttemptSettings, AxisSettings};
 use super::units::{AxesEvaluation, marks_of};
 use super::way::Way;
 use crate::simulated::cell::{Cell, Marks};
@@ -25,7 +25,7 @@ pub struct AxesSummary {
     /// Settings of the pictures' results.
     pub axis_settings: AxisSettings,
     /// Settings of the grasps' results.
-    pub grasp_settings: GraspSettings,
+    pub grasp_settings: AttemptSettings,
     /// Number of remaining units.
     pub remaining: usize,
     /// Worker seconds of the results, including teaching.

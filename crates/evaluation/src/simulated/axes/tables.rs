@@ -362,7 +362,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::simulated::axes::{AxisSettings, GraspCondition, GraspSettings, Seconds, Third};
+    use crate::simulated::axes::{AttemptSettings, AxisSettings, GraspCondition, Seconds, Third};
     use crate::simulated::settings::TeachingSettings;
     use crate::{PartGroup, wilson_interval};
 
@@ -432,7 +432,7 @@ mod tests {
             TeachingSettings { preset: "edge".into(), steps: None, time_budget: None, seed: 1, program: None };
         AxesSummary {
             axis_settings: AxisSettings { axes: 1, teaching: teaching.clone(), axis_views: 20, search_points: None },
-            grasp_settings: GraspSettings { errors: 1, teaching, attempts: 10, search_points: None },
+            grasp_settings: AttemptSettings { errors: 1, teaching, attempts: 10, search_points: None },
             remaining,
             seconds: Seconds::default(),
             groups: vec![

@@ -7,7 +7,7 @@ use sdg_simulation::views::Axis;
 
 use super::records::AxisRecord;
 use super::selection::{GraspCondition, Selection};
-use super::settings::{AxisSettings, GraspSettings};
+use super::settings::{AttemptSettings, AxisSettings};
 use crate::simulated::cell::{Cell, Marks, read_attempts};
 use crate::simulated::records::AttemptRecord;
 use crate::simulated::schedule::Task;
@@ -61,9 +61,9 @@ impl AxesEvaluation<'_> {
     }
 
     /// The settings of attempts under errors.
-    pub fn grasp_settings(&self) -> GraspSettings {
-        GraspSettings {
-            errors: GraspSettings::ERRORS,
+    pub fn grasp_settings(&self) -> AttemptSettings {
+        AttemptSettings {
+            errors: AttemptSettings::ERRORS,
             teaching: self.store.settings().teaching(),
             attempts: self.store.settings().attempts,
             search_points: self.search_points,

@@ -1,13 +1,13 @@
-//! The plan for teaching a model with a network: detector, conversion to poses, samples, steps.
+//! The settings for teaching a model with a network: detector, conversion to poses, samples, steps.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle};
 use sdg_training::TrainingConfig;
 
-use super::detector_plan::DetectorPlan;
+use super::detector_teaching::DetectorTeaching;
 use super::fine_tuning::FineTuning;
 use super::options::TeachOptions;
 use super::paper;
-use super::preset::{OrientationPlan, Preset};
+use super::preset::{OrientationTeaching, Preset};
 use crate::base_weights::BaseWeights;
 use crate::facts::ModelKind;
 
@@ -16,11 +16,11 @@ const MIN_HIT_RATE: f64 = 0.5;
 
 /// All settings for teaching a model with a network, except the demonstrations and the initial weights.
 #[derive(Debug, Clone)]
-pub(crate) struct Plan {
+pub(crate) struct NetworkTeaching {
     /// The detector.
-    pub(crate) detector: DetectorPlan,
+    pub(crate) detector: DetectorTeaching,
     /// The conversion of detections to poses, and the training that it needs.
-    pub(crate) reading: ReadingPlan,
+    pub(crate) reading: ReadingTeaching,
     /// The detector's training.
     pub(crate) training: TrainingConfig,
     /// The training samples.
@@ -37,9 +37,9 @@ pub(crate) struct Plan {
 
 /// The conversion of detections to poses of the demonstration.
 #[derive(Debug, Clone)]
-pub(crate) enum ReadingPlan {
+pub(crate) enum ReadingTeaching {
     /// Model A, which has a second network.
-    BoxAndCrop(Box<OrientationPlan>),
+    BoxAndCrop(Box<OrientationTeaching>),
     /// Model B.
     BoxAndKeypoints,
     /// Model C.
@@ -48,19 +48,19 @@ pub(crate) enum ReadingPlan {
     Mask,
 }
 
-impl Plan {
-    /// The plan for options with initial weights already read; `None` for model S, which has no network.
+impl NetworkTeaching {
+    /// The settings for options with initial weights already read; `None` for model S, which has no network.
     pub(crate) fn new(options: &TeachOptions) -> Option<Self> {
         let &TeachOptions { kind, preset, seed, symmetry, .. } = options;
         let reading = match kind {
-            ModelKind::A => ReadingPlan::BoxAndCrop(Box::new(preset.orientation(symmetry, seed))),
-            ModelKind::B => ReadingPlan::BoxAndKeypoints,
-            ModelKind::C => ReadingPlan::Keypoints,
-            ModelKind::D => ReadingPlan::Mask,
+            ModelKind::A => ReadingTeaching::BoxAndCrop(Box::new(preset.orientation(symmetry, seed))),
+            ModelKind::B => ReadingTeaching::BoxAndKeypoints,
+            ModelKind::C => ReadingTeaching::Keypoints,
+            ModelKind::D => ReadingTeaching::Mask,
             ModelKind::S => return None,
         };
         let weights = options.start.weights();
-        let mut plan = Self {
+        let mut teaching = Self {
             detector: preset.detector(kind, weights.is_some())?,
             reading,
             training: preset.training(kind, seed),
@@ -76,12 +76,12 @@ impl Plan {
         };
         let of_our_weights = || weights.is_some_and(BaseWeights::is_ours).then(|| FineTuning::new(seed));
         if let Some(fine_tuning) = options.fine_tuning.clone().or_else(of_our_weights) {
-            plan.fine_tune(fine_tuning);
+            teaching.fine_tune(fine_tuning);
         }
         if let Some(steps) = options.steps {
-            plan.set_steps(steps);
+            teaching.set_steps(steps);
         }
-        Some(plan)
+        Some(teaching)
     }
 
     fn fine_tune(&mut self, fine_tuning: FineTuning) {
@@ -97,7 +97,7 @@ impl Plan {
 
     /// Sets the number of detector steps; the number for the orientation CNN changes in proportion.
     fn set_steps(&mut self, steps: usize) {
-        if let ReadingPlan::BoxAndCrop(orientation) = &mut self.reading {
+        if let ReadingTeaching::BoxAndCrop(orientation) = &mut self.reading {
             let training = &mut orientation.training;
             training.steps = (training.steps * steps).div_ceil(self.training.steps);
         }

@@ -31,7 +31,7 @@ pub struct PixelRect {
 
 /// The picture position of each pixel of a plan view, computed once for all pictures of a camera.
 #[derive(Debug, Clone)]
-pub struct PlanMap {
+pub struct PlanViewMap {
     width: u32,
     height: u32,
     columns: usize,
@@ -41,7 +41,7 @@ pub struct PlanMap {
     samples: usize,
 }
 
-impl PlanMap {
+impl PlanViewMap {
     /// The map for a camera that looks at the plane of a plan view.
     pub fn new(camera: &PosedCamera, view: &PlanView) -> Self {
         Self::of([view.width, view.height], |at| camera.project(&view.point(&at)))
@@ -90,7 +90,7 @@ impl PlanMap {
 
 /// `width` pixels of a row of the plan view.
 struct ResampleRow<'a> {
-    map: &'a PlanMap,
+    map: &'a PlanViewMap,
     reader: PixelReader<'a>,
     y: u32,
     left: u32,
@@ -155,7 +155,7 @@ mod tests {
     fn places_between_the_grids_are_exact_to_a_fiftieth_of_a_pixel() {
         let camera = camera(25.0, PlumbBob { k1: -0.3, k2: 0.1, p1: 0.001, p2: 0.001, k3: 0.0 });
         let view = PlanView::of(&camera, 0.02, 1000.0, None, 10_000_000).unwrap();
-        let map = PlanMap::new(&camera, &view);
+        let map = PlanViewMap::new(&camera, &view);
         for (x, y) in (0..view.width).step_by(13).flat_map(|x| (0..view.height).step_by(11).map(move |y| (x, y))) {
             let middle = Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
             let (Some(exact), Some([first, last])) =
@@ -173,9 +173,9 @@ mod tests {
         let camera = camera(0.0, PlumbBob::NONE);
         let picture = RgbImage::from_fn(640, 480, |x, y| Rgb([(x % 256) as u8, (y % 256) as u8, 77]));
         let view = PlanView::of(&camera, 0.0, 1000.0, None, 1_000_000).unwrap();
-        assert_eq!(PlanMap::new(&camera, &view).resample(&picture), picture);
+        assert_eq!(PlanViewMap::new(&camera, &view).resample(&picture), picture);
         let wider = PlanView { left_m: view.left_m - 0.01, width: view.width + 10, ..view };
-        let made = PlanMap::new(&camera, &wider).resample(&picture);
+        let made = PlanViewMap::new(&camera, &wider).resample(&picture);
         assert_eq!(made.get_pixel(3, 100), picture.get_pixel(0, 100));
         assert_eq!(made.get_pixel(10, 100), picture.get_pixel(0, 100));
     }
@@ -185,7 +185,7 @@ mod tests {
         let camera = camera(0.0, PlumbBob::NONE);
         let board = RgbImage::from_fn(640, 480, |x, y| Rgb([if (x + y) % 2 == 0 { 0 } else { 200 }; 3]));
         let view = PlanView::of(&camera, 0.0, 250.0, None, 1_000_000).unwrap();
-        let made = PlanMap::new(&camera, &view).resample(&board);
+        let made = PlanViewMap::new(&camera, &view).resample(&board);
         assert_eq!(made.dimensions(), (160, 120));
         assert!(made.pixels().all(|pixel| pixel[0].abs_diff(100) <= 1), "{:?}", made.get_pixel(5, 5));
     }

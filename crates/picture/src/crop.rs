@@ -1,4 +1,4 @@
-//! The network's input: the square around a detected box.
+//! Crops of pictures for networks: the square around a detected box, or any rotated square.
 //!
 //! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part: a
 //! bar at 30° in a wide box would appear at another angle, with an error that depends on the angle itself.
@@ -12,12 +12,10 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, BoundingBox};
 
-use crate::error::{OrientationError, Result};
-
 /// Ratio of the crop's side to the box's diagonal: room for a small error of the box.
 const SIDE_PER_DIAGONAL: f64 = 1.1;
 
-/// Colour of a crop beyond the image: the mean colour of photos, which is zero in the network's input.
+/// Colour of a crop beyond the image: the mean colour of photos, which is zero in a network's input.
 pub const OUTSIDE: [u8; 3] = [124, 116, 104];
 
 /// Maximum number of samples averaged for one pixel of a crop, along each axis: enough for an eightfold reduction.
@@ -35,18 +33,12 @@ pub struct CropWindow {
 }
 
 impl CropWindow {
-    /// The square around a box.
-    ///
-    /// # Errors
-    /// [`OrientationError::BadBox`] for a box without area or with a corner that is not finite.
-    pub fn around(bbox: &BoundingBox) -> Result<Self> {
+    /// The square around a box; `None` for a box without area or with a corner that is not finite.
+    pub fn around(bbox: &BoundingBox) -> Option<Self> {
         let &BoundingBox { x1, y1, x2, y2 } = bbox;
         let usable = [x1, y1, x2, y2].iter().all(|value| value.is_finite()) && x1 < x2 && y1 < y2;
-        if !usable {
-            return Err(OrientationError::BadBox { x1, y1, x2, y2 });
-        }
         let side = SIDE_PER_DIAGONAL * bbox.width().hypot(bbox.height());
-        Ok(Self { center: bbox.center(), side, turn: Angle::ZERO })
+        usable.then(|| Self { center: bbox.center(), side, turn: Angle::ZERO })
     }
 
     /// The direction in the crop that corresponds to a direction in the image.
@@ -146,27 +138,6 @@ fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     }))
 }
 
-/// The crop of a detected box, as [`OrientationCnn::predict`](crate::OrientationCnn::predict) expects it: `size_px` ×
-/// `size_px` pixels of the square around the box's centre.
-///
-/// # Units and frames
-/// `bbox` in pixels of `image`, x right, y down, the centre of the first pixel at (0.5, 0.5); it may extend beyond the
-/// image, where the colour is [`OUTSIDE`].
-///
-/// # Errors
-/// An image without pixels, a box without area or not finite, a size of zero.
-pub fn crop_for(image: &RgbImage, bbox: &BoundingBox, size_px: u32) -> Result<RgbImage> {
-    let (width, height) = image.dimensions();
-    if width == 0 || height == 0 {
-        return Err(OrientationError::EmptyImage { width, height });
-    }
-    if size_px == 0 {
-        let expected = "at least 1".to_owned();
-        return Err(OrientationError::Config { field: "size of the crop", expected, found: "0".to_owned() });
-    }
-    Ok(CropWindow::around(bbox)?.read(image, size_px))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,7 +172,7 @@ mod tests {
     fn a_crop_shows_what_the_window_covers() {
         // The right half of the image is red; the box's centre is on the border between the halves.
         let image = RgbImage::from_fn(80, 60, |x, _| Rgb(if x < 40 { [0, 0, 0] } else { [200, 0, 0] }));
-        let crop = crop_for(&image, &boxed(35.0, 25.0, 45.0, 35.0), 16).unwrap();
+        let crop = CropWindow::around(&boxed(35.0, 25.0, 45.0, 35.0)).unwrap().read(&image, 16);
         assert_eq!(crop.dimensions(), (16, 16));
         assert!((0..16).all(|y| crop.get_pixel(0, y).0 == [0, 0, 0] && crop.get_pixel(15, y).0 == [200, 0, 0]));
     }
@@ -239,20 +210,15 @@ mod tests {
 
     #[test]
     fn beyond_the_image_lies_the_mean_colour() {
-        let crop = crop_for(&RgbImage::new(20, 20), &boxed(-10.0, -10.0, 10.0, 10.0), 8).unwrap();
+        let crop = CropWindow::around(&boxed(-10.0, -10.0, 10.0, 10.0)).unwrap().read(&RgbImage::new(20, 20), 8);
         assert_eq!(crop.get_pixel(0, 0).0, OUTSIDE);
         assert_eq!(crop.get_pixel(6, 6).0, [0, 0, 0]);
     }
 
     #[test]
-    fn boxes_without_sense_are_errors() {
-        let image = RgbImage::new(20, 20);
+    fn boxes_without_sense_have_no_window() {
         for bad in [boxed(5.0, 5.0, 5.0, 9.0), boxed(5.0, 5.0, 3.0, 9.0), boxed(f64::NAN, 0.0, 9.0, 9.0)] {
-            assert!(matches!(crop_for(&image, &bad, 8), Err(OrientationError::BadBox { .. })), "{bad:?}");
+            assert!(CropWindow::around(&bad).is_none(), "{bad:?}");
         }
-        let good = boxed(1.0, 1.0, 9.0, 9.0);
-        assert!(crop_for(&RgbImage::new(0, 5), &good, 8).is_err());
-        let error = crop_for(&image, &good, 0).unwrap_err().to_string();
-        assert_eq!(error, "orientation CNN: size of the crop must be at least 1, found 0");
     }
 }

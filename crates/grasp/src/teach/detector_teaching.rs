@@ -10,7 +10,7 @@ use crate::error::Result;
 
 /// A detector, and a head that is removed after teaching.
 #[derive(Debug, Clone)]
-pub(crate) struct DetectorPlan {
+pub(crate) struct DetectorTeaching {
     /// The detector's configuration.
     pub(crate) network: RcnnConfig,
     /// A keypoint head that exists only during teaching.
@@ -21,7 +21,7 @@ pub(crate) struct DetectorPlan {
     pub(crate) auxiliary_keypoints: Option<KeypointHeadConfig>,
 }
 
-impl DetectorPlan {
+impl DetectorTeaching {
     /// The detector during teaching.
     pub(crate) fn taught(&self) -> RcnnConfig {
         let mut taught = self.network.clone();
