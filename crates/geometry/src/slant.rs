@@ -18,6 +18,11 @@ pub struct Slant {
 }
 
 impl Slant {
+    /// The view from vertically above.
+    pub fn level(focal_px: f64) -> Self {
+        Self { tilt_rad: 0.0, away: Angle::ZERO, focal_px }
+    }
+
     /// The position in the slanted picture of a point of the level picture; both relative to the picture's centre.
     /// `None` behind the camera or close to its plane.
     pub fn picture_from_level(&self, level: Vector2<f64>) -> Option<Vector2<f64>> {

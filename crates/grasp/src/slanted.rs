@@ -33,6 +33,11 @@ const MIN_EXPLAINED: f64 = 0.1;
 /// For places seen by a camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned
 /// sets).
 const SLANT_GAIN: f64 = 0.03;
+/// Number of places that can determine a slant, which has three coordinates, and the lens, one more: each place
+/// measures two.
+const SURE_PLACES: usize = 3;
+/// Tried focal lengths, relative to the usual one: fields of view of 49°, of 70° as in most telephones, and of 25°.
+const LENSES: [f64; 3] = [1.0, 0.65, 2.0];
 /// Maximum cost of a slant as a fraction of the level camera's for which it is certain. With three or more places it is
 /// 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
 const UNEXPLAINED: f64 = 0.12;
@@ -89,44 +94,59 @@ pub(crate) fn suggested_slant(
         })
     });
     let shortened: Vec<Shortened> = shortened.into_iter().flatten().collect();
-    let focal_px = usual_focal_px(shot.size);
-    let mut costs = slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant)));
-    let level = costs.next()?;
-    if level.0 < MIN_EXPLAINED {
+    let level_cost = cost(&Slant::level(usual_focal_px(shot.size)), &shortened)?;
+    if level_cost < MIN_EXPLAINED {
         // Costs are not below 0, so that no slant explains enough.
         return None;
     }
-    let costs: Vec<(f64, Slant)> = std::iter::once(level).chain(costs).collect();
-    let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();
-    let (least_cost, likeliest) = least(&mut costs.iter())?;
-    if likeliest.tilt_rad < MIN_TILT || level.0 - least_cost < MIN_EXPLAINED {
-        return None;
-    }
-    let is_opposite =
-        |slant: &Slant| slant.tilt_rad >= MIN_TILT && slant.away.distance(likeliest.away).to_degrees() > 90.0;
-    let other = least(&mut costs.iter().filter(|(_, slant)| is_opposite(slant))).map(|(_, slant)| slant);
+    let lenses = if shortened.len() >= SURE_PLACES { &LENSES[..] } else { &LENSES[..1] };
+    let candidates: Vec<(f64, Slant)> = lenses
+        .iter()
+        .flat_map(|lens| likely_slants(lens * usual_focal_px(shot.size), &shortened, level_cost - MIN_EXPLAINED))
+        .collect();
+    let least_cost = candidates.iter().map(|(cost, _)| *cost).min_by(f64::total_cmp)?;
     // Rectifying a few places is fast, rectifying the whole picture is not.
-    let gain = |slant: &Slant| {
+    let gains = |slant: &Slant| -> Vec<f64> {
         let gains = best.iter().filter_map(|sighting| {
             let placed = &sighting.placed;
             let window = LevelImage::about(picture, shot, slant, &placed.outline().vertices)?;
             let seen = agreement_in(searched, placed, &window.image, |point| window.level_point(point))?;
             Some(seen - placed.agreement)
         });
-        gains.fold(f64::NEG_INFINITY, f64::max)
+        gains.collect()
     };
-    let (gain, slant) = std::iter::once(likeliest)
-        .chain(other)
-        .map(|slant| (gain(&slant), slant))
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (gain >= required_gain(shortened.len(), level.0, least_cost)).then_some(slant)
+    let (gains, slant) = candidates
+        .into_iter()
+        .map(|(_, slant)| (gains(&slant), slant))
+        .max_by(|(a, _), (b, _)| gained(a).total_cmp(&gained(b)))?;
+    let gain = gains.into_iter().max_by(f64::total_cmp)?;
+    (gain >= required_gain(shortened.len(), level_cost, least_cost)).then_some(slant)
 }
 
-/// The gain of agreement that the best place needs for a slant. Three or more places can determine a slant with
-/// certainty: it has three coordinates, and each place measures two. A gain is not required then, since the best
-/// places are the least shortened ones.
+/// The sum of gains; a place that lost agreement may be another thing.
+fn gained(gains: &[f64]) -> f64 {
+    gains.iter().map(|gain| gain.max(0.0)).sum()
+}
+
+/// The slant with the least cost, at most `most`, and the likeliest one towards the other side, with their costs.
+fn likely_slants(focal_px: f64, shortened: &[Shortened], most: f64) -> Vec<(f64, Slant)> {
+    let costs: Vec<(f64, Slant)> =
+        slants(focal_px).filter_map(|slant| Some((cost(&slant, shortened)?, slant))).collect();
+    let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();
+    let Some(likeliest) = least(&mut costs.iter()) else { return Vec::new() };
+    if likeliest.1.tilt_rad < MIN_TILT || likeliest.0 > most {
+        return Vec::new();
+    }
+    let is_opposite =
+        |slant: &Slant| slant.tilt_rad >= MIN_TILT && slant.away.distance(likeliest.1.away).to_degrees() > 90.0;
+    let opposite = least(&mut costs.iter().filter(|(_, slant)| is_opposite(slant)));
+    std::iter::once(likeliest).chain(opposite).collect()
+}
+
+/// The gain of agreement that the best place needs for a slant. None is required if enough places determine the slant
+/// with certainty, since the best places are the least shortened ones.
 fn required_gain(num_places: usize, level_cost: f64, least_cost: f64) -> f64 {
-    if num_places >= 3 && least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
+    if num_places >= SURE_PLACES && least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
 }
 
 /// All tried slants: tilts up to 50° in steps of 2°, directions in steps of 10°.
