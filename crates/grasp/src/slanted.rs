@@ -36,8 +36,9 @@ const SLANT_GAIN: f64 = 0.03;
 /// Number of places that can determine a slant, which has three coordinates, and the lens, one more: each place
 /// measures two.
 const SURE_PLACES: usize = 3;
-/// Tried focal lengths, relative to the usual one: fields of view of 49°, of 70° as in most telephones, and of 25°.
-const LENSES: [f64; 3] = [1.0, 0.65, 2.0];
+/// Focal lengths relative to the usual one that are also tried if they explain the places: fields of view of 70°, as in
+/// most telephones, and of 25°.
+const OTHER_LENSES: [f64; 2] = [0.65, 2.0];
 /// Maximum cost of a slant as a fraction of the level camera's for which it is certain. With three or more places it is
 /// 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
 const UNEXPLAINED: f64 = 0.12;
@@ -99,11 +100,12 @@ pub(crate) fn suggested_slant(
         // Costs are not below 0, so that no slant explains enough.
         return None;
     }
-    let lenses = if shortened.len() >= SURE_PLACES { &LENSES[..] } else { &LENSES[..1] };
-    let candidates: Vec<(f64, Slant)> = lenses
-        .iter()
-        .flat_map(|lens| likely_slants(lens * usual_focal_px(shot.size), &shortened, level_cost - MIN_EXPLAINED))
-        .collect();
+    let usual_px = usual_focal_px(shot.size);
+    let mut candidates = likely_slants(usual_px, &shortened, level_cost - MIN_EXPLAINED);
+    if shortened.len() >= SURE_PLACES {
+        let other = |lens| likely_slants(lens * usual_px, &shortened, UNEXPLAINED * level_cost);
+        candidates.extend(OTHER_LENSES.into_iter().flat_map(other));
+    }
     let least_cost = candidates.iter().map(|(cost, _)| *cost).min_by(f64::total_cmp)?;
     // Rectifying a few places is fast, rectifying the whole picture is not.
     let gains = |slant: &Slant| -> Vec<f64> {
