@@ -387,6 +387,23 @@ mod tests {
     }
 
     #[test]
+    fn places_far_apart_tell_the_lens() {
+        let usual_px = 700.0;
+        let seen = Slant { tilt_rad: 30f64.to_radians(), away: Angle::from_degrees(40.0), focal_px: 0.65 * usual_px };
+        let shortened = [[-210.0, -150.0], [200.0, -160.0], [10.0, 170.0], [220.0, 140.0]].map(|at| {
+            let at = Vector2::from(at);
+            let (log_ratio, direction) = seen.shortening_at(at).unwrap();
+            Shortened { at, shortening: shortening_vector(log_ratio, direction), weight: 0.5 }
+        });
+        let level_cost = cost(&Slant::level(usual_px), &shortened).unwrap();
+        let likely = |lens: f64| likely_slants(lens * usual_px, &shortened, UNEXPLAINED * level_cost);
+        assert!(likely(1.0).is_empty() && likely(2.0).is_empty());
+        let (cost, slant) = likely(0.65)[0];
+        assert!(cost < 1e-9 && slant.away.distance(seen.away) < 1e-9, "{cost} {slant:?}");
+        assert!((slant.tilt_rad - seen.tilt_rad).abs() < 1e-9, "{slant:?}");
+    }
+
+    #[test]
     fn three_places_that_one_slant_explains_need_no_gain() {
         // As measured for the photographed clips at 20°, and for a level picture without the part.
         assert!(required_gain(4, 0.711, 0.035) < 0.019);
