@@ -42,8 +42,9 @@ pub struct TeachArgs {
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
     /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out
-    /// is then a folder for the models and a page that lists similar parts and parts that need another photo. Existing
-    /// models are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a part's --symmetry
+    /// is then a folder for the models and a page that lists similar parts and parts that need another photo.
+    /// Models that were taught in the same way are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a
+    /// part's --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
     /// Teach only this part of --demos, without the page, so that several machines can each teach some of the parts;

@@ -85,12 +85,12 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Warns if no picture shows all squares of the board: `--squares` may be wrong.
+/// Warns if no picture shows all squares of the board: it may be another board.
 fn warn_of_squares(board: &Board, seen: &[BoardPicture]) {
     let (columns, rows) = BoardPicture::most_squares(seen);
     if (columns, rows) != (board.columns(), board.rows()) {
         eprintln!(
-            "no picture shows more than {columns} x {rows} squares of {} x {}: check --squares",
+            "no picture shows more than {columns} x {rows} squares of {} x {}: check the given board (--squares or --board)",
             board.columns(),
             board.rows()
         );

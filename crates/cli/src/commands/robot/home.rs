@@ -68,6 +68,10 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
             .plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits(robot.geometry()))?
             .motions
     };
+    if motions.iter().all(|motion| motion.duration_secs() <= 0.0) {
+        eprintln!("the arm at {address} is at home");
+        return Ok(Outcome::Done);
+    }
     let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
     if confirm(&format!("Move the arm at {address} home, in {secs:.1} s?"), args.yes)? == Consent::Refused {
         return Ok(Outcome::Done);
