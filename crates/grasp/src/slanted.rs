@@ -62,10 +62,12 @@ pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     is_sure && worth(slanted) > worth(level) + SLANT_GAIN
 }
 
-/// A shortened place: the position relative to the picture's centre, the shortening as a vector that a rotation by 180°
-/// does not change, and a weight: the fraction of edge points on crests above the minimum.
+/// A shortened place: the position relative to the picture's centre, half of the longer side of its box, the shortening
+/// as a vector that a rotation by 180° does not change, and a weight: the fraction of edge points on crests above the
+/// minimum.
 struct Shortened {
     at: Vector2<f64>,
+    reach: f64,
     shortening: Vector2<f64>,
     weight: f64,
 }
@@ -88,8 +90,10 @@ pub(crate) fn suggested_slant(
     best.truncate(NUM_SLANT_PLACES);
     let shortened = parallel::map(&best, |sighting| {
         let fit = foreshortening(searched, &sighting.placed)?;
+        let bounds = sighting.placed.outline().bounds();
         Some(Shortened {
-            at: sighting.placed.outline().bounds().center() - shot.below_camera,
+            at: bounds.center() - shot.below_camera,
+            reach: 0.5 * bounds.width().max(bounds.height()),
             shortening: shortening_vector(fit.log_ratio, fit.direction),
             weight: (fit.consensus - MIN_CONSENSUS).max(0.0),
         })
@@ -102,7 +106,8 @@ pub(crate) fn suggested_slant(
     }
     let usual_px = usual_focal_px(shot.size);
     let mut candidates = likely_slants(usual_px, &shortened, level_cost - MIN_EXPLAINED);
-    if shortened.len() >= SURE_PLACES {
+    let is_sure = num_parts(&shortened) >= SURE_PLACES;
+    if is_sure {
         let other = |lens| likely_slants(lens * usual_px, &shortened, UNEXPLAINED * level_cost);
         candidates.extend(OTHER_LENSES.into_iter().flat_map(other));
     }
@@ -117,17 +122,27 @@ pub(crate) fn suggested_slant(
         });
         gains.collect()
     };
+    let best_gain = |gains: &[f64]| gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // A place that lost agreement may be another thing.
+    let worth = |gains: &[f64]| match is_sure {
+        true => gains.iter().map(|gain| gain.max(0.0)).sum(),
+        false => best_gain(gains),
+    };
     let (gains, slant) = candidates
         .into_iter()
         .map(|(_, slant)| (gains(&slant), slant))
-        .max_by(|(a, _), (b, _)| gained(a).total_cmp(&gained(b)))?;
-    let gain = gains.into_iter().max_by(f64::total_cmp)?;
-    (gain >= required_gain(shortened.len(), level_cost, least_cost)).then_some(slant)
+        .max_by(|(a, _), (b, _)| worth(a).total_cmp(&worth(b)))?;
+    let required = if is_sure { required_gain(level_cost, least_cost) } else { SLANT_GAIN };
+    (best_gain(&gains) >= required).then_some(slant)
 }
 
-/// The sum of gains; a place that lost agreement may be another thing.
-fn gained(gains: &[f64]) -> f64 {
-    gains.iter().map(|gain| gain.max(0.0)).sum()
+/// Number of places with different parts. A network and the search can find the same part at slightly different poses,
+/// which are no independent evidence.
+fn num_parts(places: &[Shortened]) -> usize {
+    let is_first = |(idx, place): &(usize, &Shortened)| {
+        places[..*idx].iter().all(|other| (place.at - other.at).norm() > place.reach.max(other.reach))
+    };
+    places.iter().enumerate().filter(is_first).count()
 }
 
 /// The slant with the least cost, at most `most`, and the likeliest one towards the other side, with their costs.
@@ -145,10 +160,10 @@ fn likely_slants(focal_px: f64, shortened: &[Shortened], most: f64) -> Vec<(f64,
     std::iter::once(likeliest).chain(opposite).collect()
 }
 
-/// The gain of agreement that the best place needs for a slant. None is required if enough places determine the slant
+/// The gain of agreement that the best of enough places needs for a slant. None is required if they determine the slant
 /// with certainty, since the best places are the least shortened ones.
-fn required_gain(num_places: usize, level_cost: f64, least_cost: f64) -> f64 {
-    if num_places >= SURE_PLACES && least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
+fn required_gain(level_cost: f64, least_cost: f64) -> f64 {
+    if least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
 }
 
 /// All tried slants: tilts up to 50° in steps of 2°, directions in steps of 10°.
@@ -393,7 +408,7 @@ mod tests {
         let shortened = [[-210.0, -150.0], [200.0, -160.0], [10.0, 170.0], [220.0, 140.0]].map(|at| {
             let at = Vector2::from(at);
             let (log_ratio, direction) = seen.shortening_at(at).unwrap();
-            Shortened { at, shortening: shortening_vector(log_ratio, direction), weight: 0.5 }
+            Shortened { at, reach: 40.0, shortening: shortening_vector(log_ratio, direction), weight: 0.5 }
         });
         let level_cost = cost(&Slant::level(usual_px), &shortened).unwrap();
         let likely = |lens: f64| likely_slants(lens * usual_px, &shortened, UNEXPLAINED * level_cost);
@@ -404,11 +419,16 @@ mod tests {
     }
 
     #[test]
-    fn three_places_that_one_slant_explains_need_no_gain() {
+    fn places_that_one_slant_explains_need_no_gain() {
         // As measured for the photographed clips at 20°, and for a level picture without the part.
-        assert!(required_gain(4, 0.711, 0.035) < 0.019);
-        assert!(required_gain(4, 0.265, 0.097) > 0.024);
-        // A slant explains any two places.
-        assert!(required_gain(2, 0.711, 0.001) > 0.024);
+        assert!(required_gain(0.711, 0.035) < 0.019);
+        assert!(required_gain(0.265, 0.097) > 0.024);
+    }
+
+    #[test]
+    fn one_part_found_twice_is_one() {
+        let at =
+            |x: f64| Shortened { at: Vector2::new(x, 5.0), reach: 40.0, shortening: Vector2::zeros(), weight: 0.5 };
+        assert_eq!(num_parts(&[at(0.0), at(3.0), at(100.0), at(-2.0)]), 2);
     }
 }
