@@ -1,4 +1,4 @@
-//! Texts about the detections in a picture: what was found, and why it was refused.
+//! Texts about the detections in a picture: their positions, and the reasons for refusals.
 
 use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 

@@ -206,7 +206,7 @@ impl Rehearsal<'_> {
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
         let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
-        // What a robot knows of the part, it knows from the model.
+        // As with a real arm, shape and symmetry of the part are those of the model.
         let model = self.told_model(number)?;
         let grasp = GraspConfig { obstacles: obstacles.clone(), part: part_shape(&model), ..GraspConfig::default() };
         let mut workcell = Workcell::new(&WorkcellConfig {
