@@ -15,13 +15,16 @@ awk '/^## / { version = $0; lines = 0 } /^- / && ++lines > 20 { print "release: 
 scripts/packages/semver.sh
 
 export AUDITABLE=1
+# The wheels last, because they compile burn again for each machine.
 for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/deb.sh
     ARCH=$arch scripts/packages/tarball.sh
+    [ "$arch" != amd64 ] || scripts/packages/image.sh
+done
+scripts/packages/windows.sh
+for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/wheel.sh
 done
-scripts/packages/image.sh
-scripts/packages/windows.sh
 
 out=target/packages/release/$version
 rm -rf "$out"
