@@ -7,7 +7,8 @@ source scripts/packages/arch.sh
 source scripts/packages/zig.sh
 
 scripts/install.sh binutils
-zig_cargo zigbuild --package sdg-cli --bin sdg
+# Only `sdg` is built. The Python package is named so that cargo chooses the features of both, and wheel.sh uses the same compiled crates.
+zig_cargo zigbuild --package sdg-cli --package sdg-python --features sdg-python/extension --bin sdg
 
 mkdir -p "$program"
 cp "$built/sdg" "$program/sdg.new"

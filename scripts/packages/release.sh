@@ -15,7 +15,6 @@ awk '/^## / { version = $0; lines = 0 } /^- / && ++lines > 20 { print "release: 
 scripts/packages/semver.sh
 
 export AUDITABLE=1
-# The wheels last, because they compile burn again for each machine.
 for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/deb.sh
     ARCH=$arch scripts/packages/tarball.sh

@@ -11,10 +11,16 @@ out=target/packages/wheel
 scripts/python/venv.sh target/python/build maturin==1.16.0
 mkdir -p "$out"
 rm -f "$out"/single_demo_grasp-*"$machine".whl
-# maturin refuses a library that needs symbols newer than this tag.
-env PATH="$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" \
-    target/python/build/bin/maturin build --zig --compatibility "manylinux_${GLIBC/./_}" --profile "$profile" --target "$triple" \
-    --manifest-path python/Cargo.toml --out "$out" "${standard_library[@]/#-Z/-Z }"
+# zigbuild calls maturin instead of cargo, so that the linker and with it the compiled crates are those of program.sh. maturin refuses a
+# library that needs symbols newer than the tag of --compatibility.
+cat >"$tools/maturin-cargo" <<END
+#!/bin/sh
+[ "\$1" = build ] || exec "$cargo_for_target" "\$@"
+CARGO="$cargo_for_target" exec target/python/build/bin/maturin build --compatibility "manylinux_${GLIBC/./_}" --profile "$profile" \\
+    --target "$triple" --manifest-path python/Cargo.toml --out "$out" ${standard_library[*]/#-Z/-Z }
+END
+chmod +x "$tools/maturin-cargo"
+cargo_for_target=$PWD/$tools/maturin-cargo zig_cargo zigbuild
 wheel=$(echo "$out"/single_demo_grasp-*"$machine".whl)
 echo "wheel: $wheel, $(stat -c %s "$wheel") bytes"
 [ -z "${TRY:-}" ] || scripts/packages/try_wheel.sh "$wheel"
