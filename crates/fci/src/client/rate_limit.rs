@@ -1,8 +1,8 @@
 //! Limits commands to the values that the robot accepts.
 //!
 //! # Source
-//! `limitRate` of libfranka (`rate_limiting.h`), which limits relative to the robot's last reference. After lost
-//! commands, that reference differs from the client's last command.
+//! `limitRate` of libfranka (`rate_limiting.h`), which limits each command relative to the robot's last reference.
+//! After lost commands, that reference differs from the client's last command.
 
 use crate::limits::Limits;
 use crate::wire::RobotState;

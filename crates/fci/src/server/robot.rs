@@ -256,6 +256,10 @@ impl RobotCore {
                 Err(errors) => self.abort(errors),
             }
         }
+        if is_collision(self.errors) && !self.references.joints.is_at_rest() {
+            // The arm brakes from its measured motion: a reference that moved on would press on the obstacle.
+            self.follow_measurement();
+        }
         let joints = &mut self.references.joints;
         *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
         self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
@@ -274,18 +278,14 @@ impl RobotCore {
         }
     }
 
-    /// Stops because of errors: the motion ends, the arm brakes or, after a collision, stops at once; nothing moves
-    /// until the recovery.
+    /// Stops because of errors: the motion ends and the arm brakes, after a collision from its measured motion; nothing
+    /// moves until the recovery.
     pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;
         self.collisions = self.contacts;
         let is_external = self.motion.as_ref().is_some_and(|motion| motion.controller == ControllerMode::External);
-        let is_collision = errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex);
-        if is_collision {
-            // Braking would continue to press on the obstacle.
-            self.references.joints = JointReference::at_rest(self.observation.q);
-        } else if is_external {
+        if is_collision(errors) || is_external {
             // The arm is not at the reference, and must not move to it.
             self.follow_measurement();
         }
@@ -354,6 +354,10 @@ fn outgoing(command_id: u32, command: Command, status: Status) -> Outgoing {
     Outgoing { command_id, command, response: Response { status, rest: Vec::new() } }
 }
 
+fn is_collision(errors: RobotErrors) -> bool {
+    errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex)
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::SMatrix;
@@ -401,9 +405,19 @@ mod tests {
         }
     }
 
-    /// A motion of the last joint at 1.5 rad/s whose commands stop arriving.
     #[test]
     fn an_aborted_motion_brakes_within_the_limit_of_acceleration() {
+        let robot = stops_within_the_limit_of_acceleration(|_| {});
+        assert!(robot.errors().contains(RobotError::CommunicationConstraintsViolation));
+    }
+
+    #[test]
+    fn after_a_collision_the_arm_brakes_within_the_limit_of_acceleration() {
+        stops_within_the_limit_of_acceleration(|robot| robot.abort(RobotError::JointReflex.into()));
+    }
+
+    /// A motion of the last joint at 1.5 rad/s, which `stop` ends, or the lack of further commands.
+    fn stops_within_the_limit_of_acceleration(stop: impl Fn(&mut RobotCore)) -> RobotCore {
         const JOINT: usize = 6;
         const ACCELERATION: f64 = 5.0;
         let mut plant =
@@ -432,10 +446,11 @@ mod tests {
             cycle(&mut robot, Some(&RobotCommand { motion, ..RobotCommand::default() }));
         }
         assert_eq!(robot.mode, RobotMode::Move);
+        stop(&mut robot);
         let last = (0..300).map(|_| cycle(&mut robot, None)).last().unwrap();
-        assert!(robot.errors().contains(RobotError::CommunicationConstraintsViolation));
         assert!(last.abs() < STANDING, "{last} rad/s");
         let limit = Limits::PANDA.acceleration[JOINT];
         assert!(largest <= limit * 1.05, "{largest} rad/s² of at most {limit}");
+        robot
     }
 }
