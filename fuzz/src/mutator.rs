@@ -39,8 +39,8 @@ pub fn mutated(target: &Target, seeds: &[Vec<u8>], number: u64) -> Vec<u8> {
     bytes
 }
 
-/// Makes one to six mistakes in bytes, in half of the calls one. Some mistakes insert a piece of `other` or a word of
-/// the format from `dictionary`.
+/// Makes one to six mistakes in bytes; half of the calls make exactly one. Some mistakes insert a piece of `other` or a
+/// word of the format from `dictionary`.
 pub fn make_mistakes(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], rng: &mut Pcg64Mcg) {
     // Half of all inputs have one mistake, a quarter two, and so on.
     let num_mistakes = (rng.random::<u32>().trailing_zeros() + 1).min(MAX_MISTAKES);

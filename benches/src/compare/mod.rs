@@ -52,8 +52,8 @@ fn known_works() -> String {
     format!("Works: {}", names.join(", "))
 }
 
-/// Maximum relative difference between both sides' facts of a work: sums are added in different orders, ties
-/// are broken differently.
+/// Maximum relative difference between the facts (numbers that identify the result, see [`Facts`]) of two sides of a
+/// work: the sides add sums in different orders and break ties differently.
 const SAME_WORK: f64 = 0.01;
 
 /// Runs the comparison.

@@ -109,7 +109,7 @@ impl Report {
         let peak = self.peak_gflops.map_or("unknown".to_owned(), |peak| format!("{peak:.0} GFLOP/s"));
         let versions = if self.versions.is_empty() { String::new() } else { format!(" {}.", self.versions.join(", ")) };
         format!(
-            "{}; {} threads a side.{versions} Peak of a product of matrices: {peak}.",
+            "{}; {} threads per side.{versions} Peak of a product of matrices: {peak}.",
             self.machine.in_words(),
             self.threads
         )

@@ -76,7 +76,7 @@ pub fn run(args: &MatchersArgs) -> Result<()> {
         groups.extend(sets::of_split(&args.root, sets)?);
     }
     let mut text = format!(
-        "{}; {} threads a side.\n\n| pictures | matcher | a picture | ours, size fixed, is so many times as fast | found | wrong | false alarms |\n|---|---|--:|--:|--:|--:|--:|\n",
+        "{}; {} threads per side.\n\n| pictures | matcher | a picture | ours, size fixed, is so many times as fast | found | wrong | false alarms |\n|---|---|--:|--:|--:|--:|--:|\n",
         Machine::read().in_words(),
         args.threads
     );

@@ -3,7 +3,7 @@
 //! | file | shape | a row |
 //! |---|---|---|
 //! | `boxes_*.npy` | (N, 4) | x1, y1, x2, y2 |
-//! | `kps_*.npy` | (N, 2, K) | K times x, then K times y: evenly along the grasp line, K = 12 |
+//! | `kps_*.npy` | (N, 2, K) | K values of x, then K values of y; points evenly spaced along the grasp line; K = 12 |
 //!
 //! Row *i* belongs to the image `i.jpg` of 640×480 pixels. There are no labels and no outlines.
 //!
@@ -68,7 +68,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
     Ok(vec![draft.finish(image)?])
 }
 
-/// The row given by the image's name; a single row under any name, because people rename files.
+/// The row given by the image's name. If there is only one row, any name selects it, because people rename files.
 fn choose_row(rows: usize, image: &ImageFacts) -> Result<usize> {
     let stem = image.file_name.map(|name| name.rsplit(['/', '\\']).next().unwrap_or(name));
     let number = stem.and_then(|name| name.split('.').next()).and_then(|stem| stem.parse::<usize>().ok());

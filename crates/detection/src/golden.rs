@@ -406,7 +406,7 @@ fn keypoint_values(found: &Detections) -> Vec<f32> {
     found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect()
 }
 
-/// Collects the gradients in the reference, or all gradients.
+/// Collects the network's gradients: those named in `wanted`, or all gradients if `wanted` is `None`.
 struct GradientVisitor<'a> {
     path: Vec<String>,
     gradients: &'a Gradients,

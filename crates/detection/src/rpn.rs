@@ -73,7 +73,7 @@ pub type ImageSize = [usize; 2];
 /// Training or inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Training, with numbers of proposals of its own.
+    /// Training; the numbers of proposals differ from those of inference.
     Train,
     /// Inference.
     Test,

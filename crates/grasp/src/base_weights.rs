@@ -211,7 +211,7 @@ mod tests {
         let [scale, shift, mean, variance] = folded(norm.each_ref(), 1e-5);
         // (x - 2) / 2 * 3 + 0.5 = 1.5 x - 2.5
         assert!((scale.values[0] - 1.5).abs() < 1e-6 && (shift.values[0] + 2.5).abs() < 1e-6);
-        // An inactive channel keeps only its scale, because half precision cannot hold its variance.
+        // The scale of an inactive channel is kept, although half precision could not hold the channel's variance.
         assert!((scale.values[1] / 3.162e-6 - 1.0).abs() < 1e-3, "{}", scale.values[1]);
         assert_eq!((mean.values, variance.values), (vec![0.0; 2], vec![1.0 - 1e-5; 2]));
     }

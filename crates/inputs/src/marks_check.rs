@@ -22,7 +22,7 @@ pub struct MarkedPhoto<'a> {
     pub marks: &'a Path,
     /// The contents of that file.
     pub bytes: &'a [u8],
-    /// The photo's name or path, by which that file's entry for it is found.
+    /// The photo's name or path, which selects the photo's entry in the file of the marks.
     pub file_name: Option<&'a str>,
 }
 
@@ -74,7 +74,8 @@ impl MarkedPhoto<'_> {
                 let as_well = if as_stored > MIN_GAIN * as_shown { "" } else { " just as well" };
                 bail!(
                     "{}: expected marks on the photo as viewers show it, found marks that fit the stored \
-                     pixels{as_well}: an Exif orientation rotates {}, which annotation tools may ignore; save the photo upright without the tag and mark it again",
+                     pixels{as_well}: annotation tools may ignore the Exif orientation that rotates {}; save the photo \
+                     upright without the tag and mark it again",
                     self.marks.display(),
                     self.photo.display()
                 );
@@ -87,8 +88,8 @@ impl MarkedPhoto<'_> {
     /// Like [`Self::upright`], for a demonstration, in which the part must be clearly visible.
     ///
     /// # Errors
-    /// The errors of [`Self::upright`]; or the marks fit in another reading of their numbers; or their file names
-    /// another existing picture, which they fit as well.
+    /// The errors of [`Self::upright`]; or the marks also fit if their numbers are read in another way; or the file of
+    /// the marks contains the name of another existing picture, and the marks fit that picture as well.
     pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
         let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
         let annotations: Vec<&Annotation> = marked.iter().collect();
@@ -127,8 +128,8 @@ impl MarkedPhoto<'_> {
         let fit = |image: &RgbImage| marked.iter().map(|one| marks_fit(image, one)).sum::<f64>();
         (fit(self.image) <= MIN_GAIN * fit(&other)).then(|| {
             format!(
-                "{field}: expected {} or a name of no existing picture, found `{base_name}`, another picture that the \
-                 marks fit as well",
+                "{field}: expected {}, or a name that no existing picture has, found `{base_name}`, another picture \
+                 that the marks fit as well",
                 self.photo.display()
             )
         })

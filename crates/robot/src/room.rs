@@ -102,14 +102,14 @@ impl PlaceGoal {
         if near >= FINGER_ROOM_M - ROUNDING_M {
             return None;
         }
-        let turned = if turns_rad.len() > 1 { " at every angle of the hand," } else { "" };
+        let turned = if turns_rad.len() > 1 { " at every angle of the hand" } else { "" };
         let comes = match near < -ROUNDING_M {
             true => format!("would reach {:.1} mm into", -near * 1e3),
             false => format!("come within {:.1} mm of", near * 1e3),
         };
         Some(format!(
-            "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to release it, they {comes} a part in a \
-             neighbouring cell{turned} and at least {:.0} mm are required",
+            "the part is {:.0} mm wide between the fingers; the fingers are {:.0} mm thick and, open to {:.0} mm to \
+             release it, {comes} a part in a neighbouring cell{turned}; at least {:.0} mm are required",
             part.jaw_width_m() * 1e3,
             thickness_m(part) * 1e3,
             opening_m * 1e3,

@@ -73,7 +73,7 @@ pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
 }
 
-/// Sixteen descriptors, transposed, so that no product is summed across a register.
+/// Sixteen descriptors, transposed, so that no dot product needs a sum over the lanes of a register.
 type Panel = [[f32; LANES]; DESCRIPTOR_LENGTH];
 
 /// All descriptors in panels; the last panel is filled up with zeros.

@@ -9,10 +9,12 @@
 //! One loop (run.rs) trains both networks; their differences are in a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: the samples, their order, and every random choice of the losses. Apart from
-//! rounding by other vector instructions, it depends on the machine only if a time budget shortens it.
+//! rounding differences between vector instruction sets, a run depends on the machine only if a time budget shortens
+//! it.
 //!
-//! This crate deliberately does not read grasps from detections (the `grasp` crate passes a function for this), has no
-//! files, and prints nothing: a run reports its progress by [`TrainingEvent`]s or [`orientation::OrientationEvent`]s.
+//! This crate deliberately does not convert detections to grasps (the `grasp` crate passes a function for this), does
+//! not read or write files, and prints nothing: a run reports its progress by [`TrainingEvent`]s or
+//! [`orientation::OrientationEvent`]s.
 //!
 //! ```
 //! use sdg_training::{OneCycle, TrainingConfig};

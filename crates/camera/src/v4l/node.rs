@@ -31,7 +31,7 @@ pub struct Format {
     /// Sizes in pixels: a list, or a range.
     pub sizes: Sizes,
     /// Maximum frame rate of each of [`Sizes::Listed`], in frames per second; 0 if the driver does not state it. Empty
-    /// for an unsupported encoding.
+    /// for a range, and for an unsupported encoding.
     pub max_fps: Vec<f64>,
 }
 

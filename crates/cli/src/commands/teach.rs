@@ -42,9 +42,9 @@ pub struct TeachArgs {
     #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
     /// Teach many parts: a folder with, for each part, a photo with marks beside it or a folder of such photos. --out
-    /// is then a folder for the models and a page that lists similar parts and parts that need another photo.
-    /// Models that were taught in the same way are kept. Lines "NAME 4" or "NAME full" in DIR/symmetries.txt give a
-    /// part's --symmetry
+    /// is then a folder for the models and a page that lists similar parts and parts that need another photo. A part is
+    /// not taught again if its model was already taught from the same files with the same arguments. Lines "NAME 4" or
+    /// "NAME full" in DIR/symmetries.txt give a part's --symmetry
     #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera", "region"])]
     pub demos: Option<PathBuf>,
     /// Teach only this part of --demos, without the page, so that several machines can each teach some of the parts;
@@ -158,7 +158,7 @@ pub(super) fn teach_to_file(
     Ok((file, figures))
 }
 
-/// Checks all inputs before the teaching, which takes minutes.
+/// Teaches a model and writes its file. All inputs are checked first, because the teaching can take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
     let files = TeachingFiles {
@@ -251,9 +251,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         }
         if let Some(lengths) = facts.lengths {
             println!(
-                "knows its size: marks {:.1} mm above the table, {:.3} mm per pixel; grasped {:.1} mm above the table",
-                1e3 * lengths.mark_height_m,
+                "size of the part: {:.3} mm per pixel of the photo; marks {:.1} mm above the table; grasped {:.1} mm above the table",
                 1e3 / lengths.pixels_per_m,
+                1e3 * lengths.mark_height_m,
                 1e3 * lengths.grasp_height_m
             );
         }

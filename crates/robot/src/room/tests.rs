@@ -36,8 +36,8 @@ fn across_the_marked_line_fingers_need_room_for_themselves() {
     check([100.0, 47.0], &bar(), RotationalSymmetry::None).unwrap();
     let found = check([100.0, 46.0], &bar(), RotationalSymmetry::None).unwrap_err().to_string();
     let expected = "\"tray, cell 6\": expected a pitch of 100 x 47 mm, found 100 x 46 mm: the part is 20 mm wide \
-                    between the fingers; 15 mm thick and open to 40 mm to release it, they come within 1.0 mm of a \
-                    part in a neighbouring cell and at least 2 mm are required";
+                    between the fingers; the fingers are 15 mm thick and, open to 40 mm to release it, come within \
+                    1.0 mm of a part in a neighbouring cell; at least 2 mm are required";
     assert_eq!(found, expected);
 }
 

@@ -12,13 +12,14 @@ use crate::frame::Frame;
 const PART_SIDE: f64 = 96.0;
 /// Side of the frame, in pixels; the pixels around the part show its surroundings.
 pub(super) const SIDE: usize = 120;
-/// Minimum depth inside the outline of a cell that shows the part, in pixels of the frame.
+/// Minimum depth of a cell that shows the part: the distance of the cell inside the outline, in pixels of the frame.
 const INSIDE: f32 = 2.5;
 /// Depths of the cells that show the part's surroundings; below 0 outside the outline.
 const AROUND: std::ops::Range<f32> = -12.0..-3.0;
 /// A cell shows the table if its colour lies within this many spreads of one of the table's colours.
 const TABLE_SPREADS: f32 = 2.0;
-/// A cell of the part's surroundings has a colour of the picture if it lies within this many spreads of that colour.
+/// A cell of the part's surroundings counts for one of the picture's frequent colours if the cell's colour lies within
+/// this many spreads of it.
 const AROUND_SPREADS: f32 = 2.5;
 /// A colour of the picture is the table's if at least this share of the part's surroundings has it.
 const TABLE_SHARE: f32 = 0.12;
@@ -135,7 +136,7 @@ impl CloseUp {
         f64::from(without as u32) / f64::from(all.max(1) as u32)
     }
 
-    /// Mean energy inside the outline, less twice the photo's energy and the noise; 0 where that is negative.
+    /// Mean of max(0, energy of the picture − 2 · energy of the photo − noise) over the cells inside the outline.
     fn added(&self, seen: &Seen) -> f64 {
         const DEEP: f32 = 3.0;
         const NOISE: f32 = 0.1;

@@ -140,7 +140,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Writes OBJ text: positions, to a hundredth of a millimetre, texture coordinates and normals.
+    /// Writes OBJ text: positions (rounded to a hundredth of a millimetre), texture coordinates and normals.
     pub fn to_obj(&self) -> String {
         let normals = self.corner_normals();
         let mut text = String::new();
@@ -217,7 +217,7 @@ impl TriangleMesh {
     }
 }
 
-/// Lines of text, each with an index from its first occurrence, counted from 1 as in OBJ.
+/// Distinct lines of text, in the order of their first occurrence. Indices are counted from 1, as in OBJ.
 #[derive(Default)]
 struct Interned {
     lines: Vec<String>,
