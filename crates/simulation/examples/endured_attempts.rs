@@ -46,7 +46,7 @@ const MAX_CONTACT_SECS: f64 = 0.3;
 const WORKSPACE: WorkspaceBox =
     WorkspaceBox { min_m: Vector3::new(0.05, -0.55, -0.05), max_m: Vector3::new(0.68, 0.55, 0.95) };
 
-/// The largest fraction of each limit that was measured, and its time.
+/// The largest measured fraction of each limit, and its time.
 type Shares = BTreeMap<&'static str, Largest>;
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -161,7 +161,8 @@ struct Errors {
     wider_m: f64,
     picture_age_secs: f64,
     table_m: f64,
-    /// Probability that losses begin with a state, or with a command; [`Self::lost_in_a_row`] of them are then lost.
+    /// Probability, for each state and for each command, that losses begin with it; [`Self::lost_in_a_row`] states or
+    /// commands in a row are then lost.
     lost: f64,
     lost_in_a_row: u64,
 }

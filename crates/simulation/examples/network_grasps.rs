@@ -23,8 +23,8 @@ fn cell(spec: &ObjectSpec, seed: u64) -> sdg_simulation::Result<Workcell> {
     Ok(cell)
 }
 
-/// Runs an attempt over the network. Returns whether the part is held by the hand's verdict and in the simulation, and
-/// the reason if it is not.
+/// Runs an attempt over the network. Returns whether the hand's verdict is that the part is held, whether the part is
+/// held in the simulation, and the reason for a failure.
 fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<dyn std::error::Error>> {
     let (server, positions) = network::serve(&cell, pace);
     let mount = cell.wrist_camera();

@@ -4,11 +4,11 @@
 //! ```text
 //! placing tray process|lockstep [PART [CELLS [X Y]]]      spring_clip 20 100 55: a part into each cell, at a pitch of X by Y mm;
 //!                                                         placed parts stay in the scene
-//! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: each part compliantly and in joint positions, the table 5 mm higher
+//! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: grasps each part compliantly and in joint positions; the table is 5 mm higher
 //! ```
-//! Ends with an error if a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another part. Also ends
-//! with an error if fewer than 8 of 10 compliant grasps hold the part, or if they press with more than 10 N at rest or
-//! a peak of more than 25 N.
+//! Ends with an error if a part is dropped, lies more than 3 mm or 3° from its cell's pose, or moves another part. Also
+//! ends with an error if fewer than 8 of 10 compliant grasps hold the part, or if their force exceeds 10 N at rest or
+//! 25 N at its peak.
 
 use std::error::Error;
 

@@ -9,12 +9,12 @@
 //!
 //! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
 //!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
-//! - `length`: the duration of a plan compared with the best found in SECONDS (60) of optimisation: the same planner
-//!   repeated with other seeds, and with fifty times the attempts to shorten. It uses COUNT (50) problems whose
-//!   goal no straight motion reaches.
+//! - `length`: the duration of a plan compared with the best duration found in SECONDS (60) of processor time: the same
+//!   planner is repeated with other seeds, with 8 instead of 12 searches, and with fifty times as many attempts to
+//!   shorten the path. It uses COUNT (50) problems whose goal cannot be reached by a straight motion.
 //!
-//! `rate` and `proof` are timed by the clock and by the thread's processor time from Linux, which does not depend on
-//! other programs on the machine.
+//! `rate` and `proof` are timed by the clock and by the thread's processor time, as Linux reports it, which does not
+//! depend on other programs on the machine.
 //! - `serve`: answers collision checks on standard input, for other planners (benches/peers/ompl_planning.py). The
 //!   input is a problem's seed as u64 (u64::MAX ends the program), which is answered by the start and goal
 //!   configurations (14 f64). Then follow any number of configurations (7 f64), each answered by a byte (1 is free),

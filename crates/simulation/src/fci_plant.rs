@@ -62,8 +62,8 @@ impl PandaPlant {
         Self::from_data(data, ids)
     }
 
-    /// As [`PandaPlant::new`] with everything at its position in a workcell of the same configuration ([`Data::qpos`]),
-    /// at rest.
+    /// Like [`PandaPlant::new`], but with everything at rest at the positions `qpos` ([`Data::qpos`]) of a workcell of
+    /// the same configuration.
     ///
     /// # Errors
     /// As for [`PandaPlant::new`].

@@ -23,7 +23,7 @@ fn swing(secs: f64, duration: f64) -> f64 {
     0.5 * (1.0 - (2.0 * PI * (secs / duration).min(1.0)).cos())
 }
 
-/// Measures the time of a motion, and checks that every state follows the last one by a millisecond.
+/// Measures the time of a motion, and checks that every state is a millisecond later than the previous one.
 #[derive(Default)]
 struct Clock {
     secs: f64,

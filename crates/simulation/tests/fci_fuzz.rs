@@ -116,8 +116,8 @@ fn mistakes_stop_the_robot_and_nothing_else() {
             num_motions += u32::from(outgoing.response.status == Status::MotionStarted);
             num_finished += u32::from(outgoing.command == Command::Move && outgoing.response.status == Status::Success);
         }
-        // An arm that an error set in motion is soon near the end of a joint's range, where it would test no further
-        // cases.
+        // An arm that an error has set in motion is soon near the end of a joint's range, where no further cases would
+        // be tested.
         let q = plant.observe().q;
         if (q - nalgebra::SVector::<f64, 7>::from(sdg_kinematics::READY_RAD)).amax() > 0.5 {
             plant = PandaPlant::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();

@@ -68,8 +68,8 @@ fn late_commands_are_made_up_for_on_the_way() {
     end[0] += 0.6;
     end[4] += 0.4;
     let duration_ms = (motion(&start, &end).duration_secs() * 1e3) as u32;
-    // When the acceleration changes, a robot that continues at a constant one soon deviates: at the start, at the end
-    // and between. About five commands are lost each time.
+    // A robot that continues at a constant acceleration soon deviates where the commanded acceleration changes: at the
+    // start, at the end and between. About five commands are lost each time.
     let stalls = [3, 50, 150, duration_ms / 2, duration_ms - 60, duration_ms - 8].map(|at| (at, 5 * MAX_WAIT));
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), stalling(stalls.to_vec()));
     robot.follow(motion(&start, &end)).unwrap();

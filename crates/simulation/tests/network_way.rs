@@ -1,5 +1,5 @@
-//! A planned path around a wall over TCP and UDP, in lockstep: it is followed without stops at its waypoints, and
-//! stopped half-way.
+//! A planned path around a wall, over TCP and UDP in lockstep: one test follows it without stops at its waypoints, the
+//! other stops half-way.
 
 use crate::network::{connect, serve};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

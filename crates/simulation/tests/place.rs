@@ -10,7 +10,7 @@ use sdg_simulation::objects::ObjectSpec;
 /// Largest offset of a part from its cell.
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
-/// Largest movement of a lying part that is not touched, which may settle.
+/// Largest movement of a part that is already placed: it may settle, although nothing touches it.
 const MAX_MOVED_M: f64 = 0.5e-3;
 /// Largest static force that does not damage part or table.
 const MAX_STATIC_N: f64 = 10.0;

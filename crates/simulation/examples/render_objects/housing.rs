@@ -25,7 +25,7 @@ const SKIN: f64 = 0.0010;
 /// Distance by which the seats end below the long walls, because overlapping faces in one plane would be lit twice.
 const SEAT_LOWER: f64 = 0.00006;
 const LUG_LOWER: f64 = 0.00012;
-/// Bolt lugs at the corners: their centres and radii.
+/// Bolt lugs at the corners: their centres and radius.
 const LUG: (f64, f64) = (0.0375, 0.0255);
 const LUG_RADIUS: f64 = 0.0066;
 const BOLT_RADIUS: f64 = 0.0028;

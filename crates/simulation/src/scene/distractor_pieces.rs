@@ -316,7 +316,7 @@ fn gear_outline(teeth: usize, outer: f64) -> Vec<Point2<f64>> {
 mod tests {
     use super::*;
 
-    /// MuJoCo rejects a mesh in which two faces have an edge in the same direction.
+    /// MuJoCo rejects a mesh in which two faces contain the same edge in the same direction.
     #[test]
     fn no_edge_is_walked_twice_in_one_direction() {
         for kind in DistractorKind::ALL {

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 /// A colour, each channel from 0 to 1.
 pub type Color = [f64; 3];
 
-/// A square picture that can be tiled, for most surfaces without a seam.
+/// A square picture that can be tiled; most surfaces show no seam.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// The pixels.

@@ -35,7 +35,7 @@ pub struct OtherCamera {
     pub distances_m: [f64; 2],
 }
 
-/// Three cameras whose focal lengths, lenses and heights differ from those of the wrist camera (640 × 480, 550 px, 0.58
+/// Three cameras with other focal lengths, lenses and ranges of height than the wrist camera (640 × 480, 550 px, 0.58
 /// m).
 pub const OTHER_CAMERAS: [OtherCamera; 3] = [
     OtherCamera {

@@ -35,8 +35,8 @@ pub fn connect(server: &Server, change: ChangeState, pass: PassCommand) -> sdg_r
     FrankaArm::connect(&RobotAddress { host, port, hand_port }, Scheduling::Ordinary)
 }
 
-/// Serves one client. The threads of its connections end with the connections, those of the datagrams with the test's
-/// process.
+/// Serves one client. The threads of the TCP connections end with the connections, the threads of the UDP datagrams
+/// with the test's process.
 fn relay(listener: &TcpListener, robot: SocketAddr, change: ChangeState, pass: PassCommand) {
     let (mut client, _) = listener.accept().unwrap();
     let mut server = TcpStream::connect(robot).unwrap();

@@ -17,9 +17,10 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// Heights of the camera relative to the usual one.
 const HEIGHT_FACTORS: Range<f64> = 0.75..1.3;
 
-/// Tilts of the camera on the axis of tilts, in degrees; a smaller tilt is an ordinary picture.
+/// Tilts of the camera on the axis `Axis::Tilt`, in degrees; with a smaller tilt, the picture counts as an ordinary
+/// one.
 pub(super) const TILTS_DEG: Range<f64> = 5.0..20.0;
-/// Tilts of the camera on the axis of slants, in degrees.
+/// Tilts of the camera on the axis `Axis::Slant`, in degrees.
 pub(super) const SLANTS_DEG: Range<f64> = 0.0..35.0;
 
 /// Largest distance in x and in y between the part and the point at which a tilted camera is aimed, in metres.
