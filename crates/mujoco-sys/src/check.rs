@@ -10,7 +10,8 @@ use crate::library::{self, Functions};
 /// Loads libmujoco, once per process, and checks that it matches these bindings.
 ///
 /// # Errors
-/// [`LibraryError`]: it cannot be loaded, or is another version; every later call returns the same error.
+/// [`LibraryError`] if the library cannot be loaded, has another version, or has structs of other sizes; every later
+/// call returns the same error.
 pub fn load() -> Result<(), LibraryError> {
     library::load(check)
 }

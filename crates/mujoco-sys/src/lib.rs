@@ -44,7 +44,7 @@ mod library;
 pub use bindings::*;
 pub use check::load;
 pub use error::LibraryError;
-// The functions by name, before the declarations of the same names in the bindings.
+// These explicit names take precedence over the declarations of the same names in `bindings::*`.
 pub use library::{
     Handler, mj_collision, mj_contactForce, mj_defaultOption, mj_defaultVFS, mj_defaultVisual, mj_deleteData,
     mj_deleteModel, mj_deleteVFS, mj_forward, mj_fullM, mj_id2name, mj_kinematics, mj_loadXML, mj_makeData,

@@ -56,7 +56,7 @@ fn functions() -> &'static Functions {
 
 macro_rules! functions {
     ($(fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)?;)*) => {
-        // Checks the signature against the header's when compiled; nothing is linked.
+        // Compares the signature with the header's at compile time; nothing is linked.
         $(const _: unsafe extern "C-unwind" fn($($type),*) $(-> $out)? = bindings::$name;)*
 
         /// Addresses in the library.
