@@ -1,4 +1,4 @@
-//! The searched region as the page and as a grasp model have it.
+//! Converts the searched region between the page's type and the grasp models' type.
 
 use sdg_annotate::Region;
 use sdg_grasp::SearchRegion;

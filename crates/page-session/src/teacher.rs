@@ -137,7 +137,8 @@ impl PageTeacher {
         Some(HAND_OPENING_MAX_M / scale)
     }
 
-    /// The options for opening the camera of live pictures: with a calibrated camera, its size is requested.
+    /// The options for opening the camera of live pictures. With a calibrated camera, pictures of its calibrated size
+    /// in the sensor's orientation are requested.
     pub fn open_options(&self, mut options: OpenOptions) -> OpenOptions {
         if let Some((camera, _)) = &self.camera {
             [options.width, options.height] = camera.size_px();
