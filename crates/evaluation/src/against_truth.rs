@@ -1,8 +1,8 @@
 //! Compares a detected grasp with the simulator's ground truth: the pose for the hand, and the errors of position and
 //! angle.
 //!
-//! Trials and evaluations on axes score detections with [`grasp_pose`]. Rehearsals and evaluations of cameras compare the
-//! pose that perception returns, so no grasp depends on the object's known height.
+//! Trials and evaluations on axes score detections with [`grasp_pose`]. Rehearsals and evaluations of cameras compare
+//! the pose that perception returns; this pose does not depend on the object's known height.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{PlanarGrasp, PosedCamera};

@@ -28,7 +28,7 @@ const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 pub struct HeldBackSamples(Augmenter);
 
 impl HeldBackSamples {
-    /// Creates samples from photos and a seed, with the part's size in this range, and with a limited picture size.
+    /// Creates samples from photos and a seed, with the part's size within `sizes`, and with a limited picture size.
     ///
     /// # Errors
     /// No samples can be made from the photos.

@@ -39,8 +39,8 @@ pub struct LabelledFolder {
 impl LabelledFolder {
     /// Reads every label and checks it against its picture, before the detection, which takes long.
     ///
-    /// With `label`, only its instances count. Otherwise, if there are several labels, only the model's object counts.
-    /// If there is a `truth.json`, no other label is read.
+    /// With `label`, only instances with this label count. Otherwise, if there are several labels, only the model's
+    /// object counts. If there is a `truth.json`, no other label is read.
     ///
     /// # Errors
     /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the

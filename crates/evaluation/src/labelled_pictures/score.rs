@@ -51,7 +51,8 @@ pub struct TrueGrasp {
 
 impl Truth {
     /// The ground truth of an instance. If the labels do not state size and symmetry, the diagonal is the length of the
-    /// instance's marks times the demonstrations' mean ratio of both, and the symmetry is the model's.
+    /// instance's marks times the mean ratio of diagonal to length in the demonstrations, and the symmetry is the
+    /// model's.
     pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {

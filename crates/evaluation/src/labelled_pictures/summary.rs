@@ -6,7 +6,7 @@ use super::label_offset::label_offset;
 use super::records::Evaluated;
 use super::score::{Totals, by_kind};
 
-/// Numbers of found, missed and wrong, and the errors of the found parts.
+/// Numbers of found and missed parts and of wrong detections, and the errors of the found parts.
 pub fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");

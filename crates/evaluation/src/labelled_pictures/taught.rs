@@ -42,8 +42,8 @@ fn find_exactly(picture: &RgbImage, cutout: &RgbImage) -> Option<[u32; 2]> {
 /// Maximum mean difference between a copy and the photo, in 8-bit levels; a JPEG of quality 50 causes about 4.
 const MAX_COPY_DIFFERENCE: f64 = 5.0;
 
-/// Left and top of the cut-out in a copy of the whole photo, at its size; `None` if the picture is a different
-/// one.
+/// Left and top of the cut-out in a recompressed copy of the whole photo, of the same size; `None` if the picture is
+/// not such a copy.
 fn find_copy(picture: &RgbImage, demonstration: &TaughtDemonstration) -> Option<[u32; 2]> {
     let middle = demonstration.marks.photo_middle?;
     let side = |size: u32, middle: f64| {

@@ -15,7 +15,7 @@ pub struct CrossCheck {
     pub scores: Vec<Vec<f64>>,
 }
 
-/// Two parts, where the model of one accepts the photo of the other.
+/// Two parts; the model of at least one of them accepts the photo of the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LookAlikePair {
     /// Indices of the two parts.

@@ -33,7 +33,7 @@ impl PartTeaching<'_> {
     /// part's name.
     ///
     /// # Errors
-    /// Files cannot be read or written. A part that cannot be taught is an outcome.
+    /// Files cannot be read or written. A part that cannot be taught is an outcome, not an error.
     pub fn run(
         &self,
         parts: &[&PartDemonstrations],

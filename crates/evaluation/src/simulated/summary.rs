@@ -15,7 +15,8 @@ use super::store::Store;
 use super::units::Evaluation;
 use crate::statistics::{Share, wilson_interval};
 
-/// All results of a group of parts. The sums lack the remaining units; `remaining` is their number for all groups.
+/// All results of a group of parts. The remaining units are not part of the sums; `remaining` is their number for all
+/// groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub group: PartGroup,

@@ -32,7 +32,7 @@ pub struct RunDifference {
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
-    /// Numbers of cases that both runs, one run or no run solved; the first is this run.
+    /// Numbers of cases solved by both runs, by one of them, or by neither; the first run is this one.
     pub counts: PairedCounts,
     /// This run's fraction minus the other's.
     pub difference: f64,
@@ -117,7 +117,7 @@ impl Against {
 
     /// The detections of the other run's model, after a check that the pictures are the same.
     fn record(&self, cell: Cell, axis: Axis, settings: &AxisSettings) -> Result<Option<AxisRecord>> {
-        /// The settings that determine the pictures. Teaching and search may differ, and are compared.
+        /// The settings that determine the pictures. The settings of teaching and search may differ between the runs.
         #[derive(Serialize)]
         struct PictureSettings {
             axes: u32,

@@ -19,7 +19,7 @@ use crate::simulated::groups::PartGroup;
 use crate::simulated::records::{AttemptRecord, TeachingRecord};
 use crate::statistics::{Share, wilson_interval};
 
-/// All results. The sums lack the remaining units.
+/// All results. The remaining units are not part of the sums.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxesSummary {
     /// Settings of the pictures' results.

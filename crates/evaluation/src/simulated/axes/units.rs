@@ -267,7 +267,7 @@ mod tests {
         );
         assert_eq!(listed(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
 
-        // The control is the attempts of the protocol, and a part whose teaching failed needs no further work.
+        // The control consists of the attempts of the protocol, and a part whose teaching failed needs no further work.
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
         let done = AttemptsRecord::new(vec![attempt(1), attempt(2)]);
         store.write("cells/C-pendulum.attempts-verified.json", &done).unwrap();

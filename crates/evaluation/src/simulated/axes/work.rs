@@ -177,7 +177,7 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
 }
 
 /// Renders a picture of an axis. If a scene has no room for camera, cover or instances, another scene for the same
-/// section of the axis is tried.
+/// stratum of the axis is tried.
 pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {

@@ -12,7 +12,7 @@ pub struct MetricAnswer {
     pub error_deg: Option<f64>,
     /// Radius that contains the position with a probability of 68 % according to the detection, in millimetres.
     pub sigma_mm: f64,
-    /// Angle error that the detection does not exceed with a probability of 68 % by its own estimate, in degrees.
+    /// Bound of the angle error that holds with a probability of 68 % according to the detection, in degrees.
     pub sigma_deg: f64,
     /// The instance that the detection found: within 10 mm and 10°, and not found by a better detection.
     pub found: Option<usize>,
