@@ -8,8 +8,8 @@
 //! heights raw …                             also prints the measurements in the pictures, as JSON lines
 //! heights told …                            for comparison: the same scenes with true heights given, nothing measured
 //! ```
-//! Fails if the median error is above 0.7 mm, fewer than 95 of 100 errors are within 2 mm, or fewer than 116 of 120
-//! grasps hold.
+//! Fails if the median error is above 0.7 mm, fewer than 95 of 100 attempts have an error within 2 mm, or fewer than
+//! 116 of 120 grasps hold.
 
 use std::error::Error;
 use std::ops::ControlFlow;

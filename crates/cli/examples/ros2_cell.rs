@@ -99,8 +99,8 @@ impl Cell {
         let lay_m = self.workcell.base_from_object().context("a part")?.translation.z;
         let mut is_lifted = false;
         loop {
-            // On a slow computer, the simulation stays behind the clock: otherwise requests would wait forever, and the
-            // arm would move too fast to catch up.
+            // On a slow computer, the simulation does not catch up with the clock. Otherwise the loop below might never
+            // end, so that requests would wait forever, and the arm would move too fast.
             let behind_secs = begun.elapsed().as_secs_f64() - self.secs - MAX_BEHIND_SECS;
             begun += Duration::from_secs_f64(behind_secs.max(0.0));
             let until_secs = begun.elapsed().as_secs_f64();
@@ -188,7 +188,7 @@ impl Cell {
         let is_still = (opening_m - before_m).abs() < STILL_M;
         let is_over = is_there || is_still || since.elapsed() > MAX_HAND;
         if !is_over {
-            // Checked again after a time in which moving fingers exceed `STILL_M`.
+            // The hand is checked again after a time in which moving fingers exceed `STILL_M`.
             self.hand = Some((command, Instant::now() - MIN_HAND + Duration::from_millis(100), opening_m));
             return Ok(());
         }

@@ -83,8 +83,8 @@ impl LiveArgs {
 }
 
 impl RequestArgs {
-    /// Rejects camera settings given without a camera; `own` lists the command's further options of this kind, with
-    /// whether each is given.
+    /// Rejects camera settings given without a camera; `own` lists further such options of the command and states for
+    /// each whether it is given.
     ///
     /// # Errors
     /// [`Usage`] with the names of the given options.

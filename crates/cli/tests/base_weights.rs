@@ -182,7 +182,7 @@ fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
         (&values("stem.conv1.norm.running_mean")[..], &values("stem.conv1.norm.running_var")[..]),
         (&[0.0; 2][..], &[1.0; 2][..])
     );
-    // The generator's values continue through the file, so the first scale is a quarter.
+    // The fixture's scales begin at a quarter.
     assert_eq!(values("stem.conv1.norm.weight"), &[0.25, 0.5]);
 }
 

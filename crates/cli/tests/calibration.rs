@@ -16,7 +16,8 @@ use serde_json::Value;
 
 /// Maximum relative error of the focal length from 15 pictures.
 const MAX_FOCAL_ERROR: f64 = 0.002;
-/// Maximum error of the camera's position above the table, from 0.3 m, with at most [`MAX_FOCAL_ERROR`].
+/// Maximum error of the camera's position at 0.3 m above the table, if the focal length has an error of at most
+/// [`MAX_FOCAL_ERROR`].
 const MAX_PLACE_ERROR_M: f64 = 0.001;
 
 fn json(arguments: &[&str]) -> Value {

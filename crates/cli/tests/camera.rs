@@ -182,7 +182,7 @@ fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     let off = told["errors"]["median_mm"].as_f64().unwrap();
     assert!(off < 3.0, "{off} mm");
 
-    // The photo from which the model was taught is not used as a test, in the plan view either.
+    // The photo from which the model was taught is not used as a test; this also holds in the plan view.
     for (from, to) in [("image.png", "image.png"), ("annotation.json", "image.json")] {
         fs::copy(shipped("pendulum", from), Path::new(&folder).join(to)).unwrap();
     }

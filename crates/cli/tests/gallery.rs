@@ -1,4 +1,5 @@
-//! The pictures of the gallery and the tour, written into datasets/pictures by `make film`, from the shipped program.
+//! The pictures of the gallery and the tour, made with the program itself. `make film` writes them into
+//! datasets/pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};

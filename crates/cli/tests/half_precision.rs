@@ -147,7 +147,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
             LazyCell::new(|| [&exact.unsuppressed, &rounded.unsuppressed].map(|detector| detect(detector, picture)));
         for i in (0..expected.boxes.len()).filter(|&i| expected.scores[i] >= SURE) {
             made.sure += 1;
-            let j = nearest(&expected, i, &found).expect("what full precision is sure of, half precision finds");
+            let j = nearest(&expected, i, &found).expect("half precision finds what full precision is sure of");
             let kept_the_same = box_difference(&expected, i, &found, j) < MAX_PX;
             let (of, j) = if kept_the_same {
                 (&found, j)

@@ -209,7 +209,7 @@ fn a_rendered_part_is_followed_in_metres() {
         assert!(part["pose"]["sigma_mm"].as_f64().unwrap() < 5.0, "{part}");
         num_followed += 1;
     }
-    // The first frame is searched before the answer.
+    // The first frame is answered only after it was searched, so that every line has the part.
     assert_eq!(num_followed, 120, "{num_followed} of 120");
 }
 

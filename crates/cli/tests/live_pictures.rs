@@ -136,7 +136,7 @@ fn cameras_that_are_none_are_refused() {
     assert_refused(&grab(&file, &["--stall-secs=-1"]), 1, &["stall timeout"]);
     assert_refused(&grab(&file, &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
     assert_refused(&grab(&file, &["--every=-1"]), 2, &["0 to 86400"]);
-    assert!(!out.exists(), "nothing is written by what fails");
+    assert!(!out.exists(), "a failed call writes nothing");
     let jpeg = sdg(&["camera", "grab", "--from", &file, "--out", "frame.jpg"]);
     assert_refused(&jpeg, 2, &["ends in .png"]);
 }

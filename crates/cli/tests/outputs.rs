@@ -70,7 +70,7 @@ fn frames_and_samples_replace_no_picture() {
     let from = format!("dir:{pictures}");
     let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &pictures];
     refused(&grab, "found an input of this command", &[&first]);
-    // Reported before the first sample is written.
+    // The error is reported before the first sample is written.
     let list = folder.path("pictures/annotations.json");
     fs::copy(&marks, &list).unwrap();
     let demo = format!("{photo}:{list}");

@@ -124,7 +124,7 @@ fn with_a_camera_the_region_is_one_of_its_pictures() {
     let outside =
         refusal(&["detect", "--grasp-model", &model, "--camera", &camera, "--region", "600,0,100,100", &photo()]);
     assert!(outside.1.contains("--region: expected a region within the picture of 640 × 480"), "{}", outside.1);
-    // Taught with a camera as well.
+    // The region is also stored if the model is taught with a camera.
     let again = folder.path("again.sdg");
     let demo = format!("{}:{}", photo(), shipped("pendulum", "annotation.json").display());
     let teach = |region: &str| {

@@ -296,7 +296,7 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let simulated = Simulated::start(&["--object", "pendulum", "--seed", "3"]);
     let from = format!("cmd:sh {}", frames.display());
     let (workcell, states) = (file("workcell.toml"), file("states.csv"));
-    // A slow machine must not fail the test; the part does not move.
+    // The maximum age of a detection is long, so that the test does not fail on a slow machine; the part does not move.
     let grasp = [
         "grasp",
         "--robot",

@@ -218,7 +218,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         write_states(&args.states, robot.watch())?;
     }
     let ended = ended?;
-    // By the arm's own clock: a simulated arm moves faster or slower than a real one.
+    // Measured by the arm's own clock: a simulated arm moves faster or slower than a real one.
     let secs = robot.state().map_or(started.elapsed().as_secs_f64(), |state| state.time_secs - started_secs);
     print_report(args, task, &ended, secs, address.unwrap_or("sim"))
 }

@@ -54,7 +54,7 @@ fn the_page_shows_the_board_and_what_is_lacking() {
     let words = "return document.getElementById('words').textContent.startsWith('5 taken; ')";
     browser.wait_for("the same in words", words).unwrap();
     assert_eq!(browser.run("return document.getElementById('ended').hidden", &[]).unwrap(), json!(true));
-    assert_eq!(count(&folder.path().join("calibration-pictures")), 5, "the same views again are not taken");
+    assert_eq!(count(&folder.path().join("calibration-pictures")), 5, "repeated views are not taken");
     drop(child);
     browser.wait_for("that it has ended", "return !document.getElementById('ended').hidden").unwrap();
     browser.screenshot(&repository().join("target/browser-test/calibrating-ended.png")).unwrap();

@@ -53,7 +53,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     page.fill("#grasp-width", "44");
     assert_eq!(page.saved().jaw_width, Some(44.0));
 
-    // Deleted and restored.
+    // The gripper is deleted and restored.
     browser.run("document.querySelector('[data-body]').focus()", &[]).unwrap();
     press(&[DELETE]);
     page.wait_for("no gripper", "return document.querySelector('#do-grasp.done') === null");

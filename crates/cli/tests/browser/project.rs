@@ -295,7 +295,8 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
     let mut page = open(&["--port", &port, "--token-file", "key"], &["earlier", "photo"]);
-    // Removed, restored and removed again: the restarted server gives the other photo the number of the removed one.
+    // The photo is removed, restored and removed again: the restarted server gives the other photo the number of the
+    // removed one.
     for again in [true, false] {
         page.click("#remove-photo");
         page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");

@@ -17,8 +17,8 @@ const OVERLAPS: &str = "const items = [...document.querySelectorAll('.todo li')]
         .filter(([of, other]) => of === li && other !== e && meets(rect(e), rect(other)))
         .map(([, other]) => `${e.innerText} ${other.innerText}`))";
 
-/// Pairs of controls that Tab reaches in another order than they are seen: from top to bottom, then from left to right.
-/// The marks on the photo are left out.
+/// Pairs of controls that Tab reaches in another order than the visible one: from top to bottom, then from left to
+/// right. The marks on the photo are left out.
 const OUT_OF_ORDER: &str = "const all = document.querySelectorAll(arguments[0]);
     const controls = [...all].flatMap((e) => [...e.querySelectorAll('button, input, select, summary, [tabindex]')])
         .filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex >= 0)
@@ -38,7 +38,7 @@ fn tab_follows_the_order_that_is_seen() {
     let page = taught();
     add(&page, &[("other.png".to_owned(), photo())]);
     patiently(&page, "a detection", "return document.querySelector('#found .found') !== null");
-    // A teaching's button sticks to the lower edge of higher windows.
+    // In higher windows than these, the button that starts the teaching sticks to the lower edge.
     for (width, height, within) in [(390, 700, "body"), (1280, 700, ".top"), (1280, 700, ".panel"), (390, 700, "body")]
     {
         page.browser.emulate(width, height, false).unwrap();

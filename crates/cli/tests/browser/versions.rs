@@ -1,5 +1,5 @@
-//! Versions of the model: a turned hand is a change, a worse version is warned of, and the page says that a model is
-//! being taught.
+//! Versions of the model: a turned hand is a change, the page warns of a worse version, and the page says that a model
+//! is being taught.
 
 use serde_json::json;
 
@@ -70,7 +70,7 @@ fn a_hand_turned_by_half_a_turn_is_a_change() {
 #[ignore = "make test-browser: needs Chromium"]
 fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
     let page = taught();
-    // The results of a second version are made up, after the page has asked for the versions.
+    // The results of a second version are invented; they are inserted after the page has asked for the versions.
     let worse = "return new Promise((done) => setTimeout(done, 500)).then(() => import('/page/store.js')).then(({ state, changed }) => {
         const [model] = state.models;
         Object.assign(model.summary.figures, { found: [19, 19], wrong: 0, false_alarms: [0, 5] });

@@ -57,7 +57,7 @@ fn described_words(verb: &str) -> BTreeSet<String> {
         "teach" => text += &sections(&read("file-formats.md"), &|title| title == "Grasp model"),
         _ => {}
     }
-    // Every second piece between backticks is code; a fence of three counts as one.
+    // Every second piece between backticks is code; a fence of three backticks counts as one backtick.
     let code = text.split('`').skip(1).step_by(2);
     code.flat_map(|code| code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))).map(str::to_owned).collect()
 }

@@ -82,7 +82,7 @@ fn png(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let stored = stored_for(photo, orientation.unwrap_or(1)).to_rgb8();
     let (num_channels, bit_depth) = *pick(dice, &[(1, 8), (3, 8), (4, 8), (3, 16), (4, 16)]);
     let bytes_per_sample = usize::from(bit_depth) / 8;
-    // An alpha channel of 0 or of 1 everywhere was never set.
+    // An alpha channel that is 0 or 1 everywhere counts as never set.
     let alpha = if bit_depth == 8 { *pick(dice, &[255, 0, 1]) } else { 255 };
     let is_palette = num_channels == 1;
     let file = Png {

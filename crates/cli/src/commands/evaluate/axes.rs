@@ -25,7 +25,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
-    // In a folder beside the page of the paper's protocol: that page is kept.
+    // The page has its own folder, so that the page of the paper's protocol is kept.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
     sdg_files::prepare_folder(&report_folder)?;
 
