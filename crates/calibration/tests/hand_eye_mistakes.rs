@@ -33,7 +33,7 @@ fn refusal(mount: Mount, views: &[HandEyeView]) -> String {
     text
 }
 
-/// The rotation from angles about x, y and z, multiplied in this order.
+/// The rotation from angles about x, y and z, whose factors are multiplied in the order `order`.
 fn product(order: [usize; 3], about: [f64; 3]) -> UnitQuaternion<f64> {
     order.iter().fold(UnitQuaternion::identity(), |rotation, axis| {
         let mut vector = Vector3::zeros();

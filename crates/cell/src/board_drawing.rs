@@ -1,4 +1,4 @@
-//! Draws the state of taking pictures of a board on a frame.
+//! Draws on a frame the progress of taking pictures of a board.
 
 use image::RgbImage;
 use nalgebra::Point2;

@@ -86,7 +86,8 @@ fn draw_marked(drawn: &mut RgbImage, detections: &[(&GraspDetection, bool, Optio
     sdg_report::draw_detections(drawn, &marks)
 }
 
-/// Colours of the dots where edges or the surface differ; they differ in lightness, too, for colour-blind users.
+/// Colours of the dots where edges or the surface differ; the two colours also differ in lightness, for colour-blind
+/// users.
 const EDGES: Color = Color([255, 40, 60]);
 const SURFACE: Color = Color([90, 150, 255]);
 /// Colour of the frames around squares in which a feature or print differs.
@@ -145,7 +146,7 @@ fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingB
         tags.iter().flat_map(|(_, tag)| parts.iter().map(|part| part.intersection(tag))).sum()
     };
     let corners = [[0.0, height], [width, height], [0.0, 0.0], [width, 0.0]].map(in_corner);
-    // The first of equal ones.
+    // If several corners are equally good, the first one is used.
     let best = corners.into_iter().min_by(|a, b| covered(a).total_cmp(&covered(b))).unwrap_or_default();
     for ((at, _), (text, color)) in best.iter().zip(lines) {
         draw_label(drawn, *at, text, *color, text_px);

@@ -53,7 +53,7 @@ pub struct PartRecord {
     /// As in the records of pictures: the indices of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jaws_touch: Vec<usize>,
-    /// Number of the part's track; absent without tracking, like the next two.
+    /// Number of the part's track; absent without tracking, like the next two fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track: Option<u64>,
     /// State of the track.

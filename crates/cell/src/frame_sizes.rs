@@ -22,7 +22,7 @@ pub enum FrameSize {
     Right,
     /// The first frame of this wrong size in a row.
     Wrong(CellError),
-    /// As the frame before.
+    /// The same wrong size as that of the frame before.
     WrongAgain,
 }
 

@@ -9,7 +9,8 @@ use crate::grasp_task::GraspTask;
 use crate::sequence_run::Ended;
 
 impl GraspTask {
-    /// The record of the task's result. `robot` names the arm, which took `secs` of `total_secs`.
+    /// The record of the task's result. `robot` names the arm, `secs` is the arm's time and `total_secs` the time since
+    /// the program's start.
     pub fn record(&self, ended: &Ended, robot: &str, secs: f64, total_secs: f64) -> Value {
         let report = &ended.grasp;
         let last_step = if self.place.is_some() { GraspStep::Check } else { GraspStep::Hold };

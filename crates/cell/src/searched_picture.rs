@@ -61,7 +61,7 @@ pub struct SearchedPicture {
 }
 
 impl SearchedPicture {
-    /// The accepted detections, or with `with_refused` all.
+    /// The accepted detections, or all detections if `with_refused` is set.
     pub fn listed(&self, words: &DetectionWords<'_>, with_refused: bool) -> Vec<&Found> {
         self.detections.iter().filter(|found| with_refused || words.is_accepted(&found.detection)).collect()
     }

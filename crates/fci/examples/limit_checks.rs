@@ -1,4 +1,4 @@
-//! Checks that a robot stops for its limits and not before them: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
+//! Checks that a robot stops motions beyond its limits and no others: `limit_checks HOST panda|fr3 [TRIES [joints]]`.
 //!
 //! Runs one motion just inside and one just outside of each tested limit and prints a line for each. It ends with an
 //! error if a motion inside was stopped, or if a motion outside was not stopped or was stopped for another reason. For

@@ -91,8 +91,8 @@ impl Piece {
 }
 
 impl RoundedPath {
-    /// Creates a path through waypoints (rad), no two successive ones equal. Each inner waypoint has the size of its
-    /// corner: the distance of the corner's start and end from the waypoint, s at full speed.
+    /// Creates a path through waypoints (rad), no two successive ones equal. `corner_secs` has the size of the corner
+    /// at each inner waypoint: the distance of the corner's start and end from the waypoint, s at full speed.
     ///
     /// # Panics
     /// If the numbers do not match, two successive waypoints are equal, a size is not positive, or corners overlap.

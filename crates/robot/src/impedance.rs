@@ -78,7 +78,7 @@ impl Impedance {
     pub(crate) fn validate(&self, when: &str) -> Result<()> {
         /// Along and about each direction, N/m and N·m/rad. A reference 15 mm ahead of the tcp then presses with 15 N.
         const MAX_STIFFNESS: [f64; 2] = [1000.0, 100.0];
-        /// About the mass of an arm, kg; the same number limits the rotational values, kg·m².
+        /// Roughly the mass of an arm, kg; the same number limits the rotational values, kg·m².
         const MAX_MASS: f64 = 20.0;
         const MAX_INTEGRAL_PER_SEC: f64 = 10.0;
         const MAX_NULL_STIFFNESS: f64 = 100.0;

@@ -3,8 +3,8 @@
 //! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth
 //! step. The arm thus stays on the checked path, and its velocities do not exceed the motion's. The additional
 //! acceleration is the velocity times `d²s/dt²`. This factor is at most `1.5 / STOP_SECS`, which gives 3.3 rad/s² for
-//! joint 2 of a Panda at 60 % of its speed. This joint has the lowest limit, 7.5 rad/s², of which the motion itself,
-//! including corners, uses 40 %.
+//! joint 2 of a Panda at 60 % of its speed. This joint has the lowest limit, 7.5 rad/s², of which a free motion itself,
+//! including corners, uses at most 40 %.
 
 use sdg_kinematics::JointVector;
 

@@ -12,7 +12,7 @@ use crate::safety::{FeltBelow, LimitsFrom, SafetyLimits, Violation};
 use crate::touch::{TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 
-/// Largest distance of a motion's start from the controller's reference, rad; a person cannot see it.
+/// Largest distance of a motion's start from the controller's reference, rad; a distance this small is not visible.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 /// Maximum number of times that a motion is slowed down until joints and tcp keep their limits.
 const MAX_SLOWDOWNS: usize = 8;
@@ -32,7 +32,7 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
-    /// The load that was given to the hand.
+    /// The load of the hand that was set last.
     load: Load,
     /// The last compliant descent, until the next motion has ended without an error.
     felt_below: Option<FeltBelow>,
@@ -143,8 +143,8 @@ impl<'a, A: Arm> Robot<'a, A> {
         plan(share)
     }
 
-    /// The limits of a motion from a configuration: a hand that came down by contact below the limits may move straight
-    /// up.
+    /// The limits of a motion from a configuration: a hand that descended to a contact below the limits may move
+    /// straight up.
     pub(crate) fn limits_from(&self, start: &JointVector) -> LimitsFrom<'_> {
         self.limits.starting_at(start, self.felt_below.as_ref())
     }

@@ -118,7 +118,8 @@ impl PlaceGoal {
     }
 
     /// Tries three minimum distances between the fingers, at this opening (m), and the surrounding parts, the largest
-    /// first. Returns the poses of the hand that keep the first distance that any pose keeps; empty if there is none.
+    /// first. Returns the poses of the hand that keep the largest of these distances that at least one pose keeps;
+    /// empty if no pose keeps any of them.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,

@@ -44,7 +44,7 @@ pub const HISTORY_SECS: f64 = 1.0;
 const MAX_SPEED_SHARE: f64 = 2.0;
 const NOISE_RAD: f64 = 0.005;
 
-/// Called for each state until a reason to stop, and before motions; returns the reason if the arm must stop.
+/// Called for each state until there is a reason to stop, and before motions; returns the reason if the arm must stop.
 pub type StopRequest = Box<dyn FnMut() -> Option<StopReason> + Send>;
 
 /// Checks every state of a moving arm.

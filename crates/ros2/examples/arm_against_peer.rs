@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if hand.is_grasping { "holds" } else { "holds nothing" }
         );
     }
-    // The peer moves the hand until it is cancelled.
+    // The peer moves the hand until the goal is cancelled.
     arm.start_hand(HandCommand::Move { opening_m: 0.04, speed_m_s: 0.1 })?;
     let endless = arm.finish_hand(&mut Watch::default());
     println!("endless: {}", endless.map_or_else(|error| error.to_string(), |_| "arrived".to_owned()));

@@ -38,7 +38,8 @@ pub struct Board {
 impl Board {
     /// Minimum and maximum number of squares along a side: four squares have three corners between them.
     pub const SIDES: [u32; 2] = [4, 30];
-    /// Radius of a dot, in sides of a square. A dot stays outside circles of 0.45 sides around the corners.
+    /// Radius of a dot, in sides of a square. A dot stays outside circles with a radius of 0.45 sides around the
+    /// corners.
     pub const DOT_RADIUS: f64 = 0.17;
     /// Minimum and maximum side of a square, in metres: from a board under a microscope to one on a wall.
     const SQUARES_M: [f64; 2] = [0.0005, 0.5];

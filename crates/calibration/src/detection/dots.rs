@@ -22,7 +22,8 @@ const MAX_CONTRADICTION: f64 = 0.2;
 const MIN_MARGIN: f64 = 1.5;
 /// Number of found corners that may lie outside the board.
 const MAX_OUTSIDE: usize = 2;
-/// Largest fraction of the dots that may be present on a board without dots; half of a board's squares have one.
+/// Largest number of dots that may be detected on a board without dots, as a fraction of the dots of a board with them,
+/// on which half of the squares have one.
 const MAX_PLAIN: f64 = 0.3;
 /// Distance from a square's centre of the points at which the square's own colour is sampled, in sides: outside a dot
 /// and inside the edges.

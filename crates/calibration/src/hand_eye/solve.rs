@@ -1,4 +1,4 @@
-//! Minimises the reprojection error over all pictures; also estimates the robot's errors if it is too large.
+//! Minimises the reprojection error over all pictures; also estimates the robot's errors if this error is too large.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{Mount, PinholeCamera};

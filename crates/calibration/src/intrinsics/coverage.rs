@@ -75,8 +75,8 @@ const PARTS: [[&str; 3]; 3] = [
     ["in the lower left corner", "at the lower border", "in the lower right corner"],
 ];
 
-/// The deficiencies, the most useful to correct first: without tilts the focal length is undetermined, without corners
-/// in all parts the lens.
+/// The deficiencies, the most useful to correct first: without tilts the focal length is undetermined, and without
+/// corners in all parts of the picture the lens is.
 pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
     let mut advice = Vec::new();
     let normals = bundle.normals();

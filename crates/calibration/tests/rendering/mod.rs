@@ -1,4 +1,5 @@
-//! Pictures of boards with ground truth, bit-identical on every machine: only operations that IEEE 754 rounds exactly.
+//! Pictures of boards with ground truth, bit-identical on every machine: they use only operations that IEEE 754 rounds
+//! exactly.
 //!
 //! Every pixel is the mean over its area. The lens is inverted at the corners of the pixels and approximated as linear
 //! within a pixel.

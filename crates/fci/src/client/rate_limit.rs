@@ -16,7 +16,7 @@ const MARGIN: f64 = 1e-3;
 const NUM_LOST_BEFORE_LIMIT: f64 = 3.0;
 
 /// The joint positions (rad) nearest to `q` that the robot accepts after `state`. Velocity, acceleration and jerk are
-/// within `limits`, and the velocity can stay within them in the next cycles; an exception are joints 5 and 7 of an FR3
+/// within `limits`, and the velocity can stay within them in the next cycles; exceptions are joints 5 and 7 of an FR3
 /// near their ends, where the velocity limit decreases faster than they may brake. Positions are not limited.
 pub fn limit_joint_positions(limits: &Limits, state: &RobotState, q: &[f64; 7]) -> [f64; 7] {
     std::array::from_fn(|joint| {

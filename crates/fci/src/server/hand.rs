@@ -13,14 +13,14 @@ const MAX_FORCE_N: f64 = 70.0;
 const MOVING_FORCE_N: f64 = 30.0;
 /// Largest difference between the commanded width and a width that counts as reached.
 const WIDTH_TOLERANCE_M: f64 = 1e-3;
-/// Speed below which fingers have stopped if it lasts for [`STANDING_CYCLES`].
+/// Fingers have stopped if they are slower than this for [`STANDING_CYCLES`].
 const STANDING_M_S: f64 = 2e-3;
 const STANDING_CYCLES: u32 = 100;
 /// Maximum number of cycles of a motion.
 const MAX_CYCLES: u32 = 20_000;
 /// Speed of homing.
 const HOMING_SPEED_M_S: f64 = 0.05;
-/// Target width of closing fingers, so far beyond zero that they press on any object.
+/// Target width of closing fingers, so far below zero that they press on any object.
 const PRESSING_WIDTH_M: f64 = -0.03;
 /// Reported temperature of the hand, °C.
 const TEMPERATURE: u16 = 30;

@@ -278,8 +278,8 @@ impl RobotCore {
         }
     }
 
-    /// Stops because of errors: the motion ends and the arm brakes, after a collision from its measured motion; nothing
-    /// moves until the recovery.
+    /// Stops because of errors: the motion ends and the arm brakes, from its measured motion after a collision or if
+    /// the client controlled the torques, otherwise from its reference. Nothing moves until the recovery.
     pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;

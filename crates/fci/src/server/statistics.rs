@@ -12,7 +12,7 @@ pub struct ServerStatistics {
     pub num_states: u64,
     /// Number of cycles within motions, from the first command of each motion on.
     pub num_motion_cycles: u64,
-    /// Number of commands that arrived in their own cycle.
+    /// Number of commands that arrived in the cycle whose number they carry.
     pub num_commands: u64,
     /// Number of commands of a motion that carry the number of another cycle, usually because they arrived too late.
     pub num_late: u64,

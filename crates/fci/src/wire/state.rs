@@ -24,11 +24,11 @@ pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 
 /// effector `NE`, `ee` is the end effector `EE`, and `stiffness` is `K`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotState {
-    /// Milliseconds since the robot started; a command answers the state of its number.
+    /// Milliseconds since the robot started; a command answers the state with the same number.
     pub message_id: u64,
     /// Measured pose of the end effector (`O_T_EE`).
     pub base_from_ee: Transform,
-    /// Pose of the end effector by the reference (`O_T_EE_d`).
+    /// Pose of the end effector according to the reference (`O_T_EE_d`).
     pub base_from_ee_desired: Transform,
     /// End effector relative to the flange (`F_T_EE`).
     pub flange_from_ee: Transform,

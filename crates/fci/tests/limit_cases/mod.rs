@@ -244,7 +244,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
 }
 
 /// Joint limits in Cartesian motions far from the Cartesian limits, along the base's x, from [`READY`]. Franka's robots
-/// stop for them: a Panda stops at 2.5 m/s², because joint 2 would need 7.9 rad/s² and its limit is 7.5.
+/// stop if these joint limits are violated: a Panda stops at 2.5 m/s², because joint 2 would need 7.9 rad/s² and its
+/// limit is 7.5.
 pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
     let acceleration = limits.acceleration[1] / JOINT_2_PER_METRE;

@@ -81,11 +81,12 @@ impl CartesianLimits {
     }
 }
 
-/// The hand, as an index of the bodies.
+/// Index of the hand among the bodies.
 const HAND: usize = 8;
 const HELD: usize = 9;
-/// Pairs of bodies that can collide. Missing pairs are neighbours, or are kept apart by the joints' ranges; a test in
-/// `simulation` compares the pairs with MuJoCo.
+/// Pairs of bodies that can collide. The missing pairs are neighbours, pairs that the joints' ranges keep apart, and
+/// the held part with the hand and links 6 and 7, which it may touch. A test in `simulation` compares the pairs with
+/// MuJoCo.
 const SELF_PAIRS: [(usize, usize); 23] = [
     (0, 5),
     (0, 6),

@@ -151,7 +151,7 @@ impl Search {
         weights: &Weights,
         shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
     ) {
-        // From the hand to the base, because the outer bodies are close to an obstacle most often.
+        // From the held part to link 1, because the outer bodies are close to an obstacle most often.
         for body in (FIRST_MOVING..NUM_BODIES).rev() {
             let capsules = &model.arm.capsules[body];
             if model.may_touch[body][index] || capsules.is_empty() {

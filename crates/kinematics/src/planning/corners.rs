@@ -10,8 +10,8 @@ const MIN_SIZE_SECS: f64 = 2e-3;
 /// Minimum increase, as a factor of the known free size, for which a larger size is checked.
 const MIN_GROWTH: f64 = 1.15;
 
-/// The path through waypoints, with corners as large as the space and the obstacles allow, each proven as a whole. If
-/// no rounding of a waypoint is free, there are several paths, each starting where the previous one ends.
+/// The path through waypoints, with corners as large as the space and the obstacles allow, each proven to be free as a
+/// whole. If no rounding of a waypoint is free, there are several paths, each starting where the previous one ends.
 pub(super) fn round(checker: &mut Checker<'_>, waypoints: &[JointVector]) -> Vec<RoundedPath> {
     let mut waypoints = waypoints.to_vec();
     waypoints.dedup_by(|next, before| length_secs(before, next) < MIN_LENGTH_SECS);

@@ -73,8 +73,8 @@ pub struct Plan {
     pub num_checks: usize,
     /// Number of configurations that were checked before the first path was shortened.
     pub num_search_checks: usize,
-    /// Approximate durations, s: of the first path before it was shortened, and of the plan; both with stops at the
-    /// waypoints and at full speed.
+    /// Approximate durations, s: of the first path before it was shortened, and of the plan; both at full speed and
+    /// with stops at the waypoints.
     pub cost_secs: [f64; 2],
 }
 

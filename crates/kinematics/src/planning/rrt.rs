@@ -38,8 +38,9 @@ impl Samples {
 
     /// Only configurations that can be on a path to one of the goals that takes less than `max_secs` at full speed.
     ///
-    /// On such a path, a joint leaves the range between its start and its goal by at most half of its remaining travel.
-    /// Without obstacles, every goal must be reachable on a straight line within that time.
+    /// On such a path, a joint leaves the range between its start and its goal by at most half of its spare travel (the
+    /// angle that it can cover in `max_secs`, less the angle between start and goal). Without obstacles, every goal
+    /// must be reachable on a straight line within that time.
     pub(super) fn on_quicker_ways(
         limits: &JointLimits,
         start: &JointVector,

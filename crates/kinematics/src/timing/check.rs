@@ -105,8 +105,8 @@ impl Worst {
     }
 }
 
-/// Jerk, as a fraction of the limit, that corners at the start or end of an acceleration do not reach. A change from
-/// one extreme to the other has twice the limit.
+/// Jerk, as a fraction of the limit, that is not reached where an acceleration only begins or ends. Where the
+/// acceleration changes from one extreme to the other, the jerk is twice the limit.
 const JUMP_JERK: f64 = 1.3;
 
 /// Times that are at most `max_secs` apart, including those of each jump of the profile's jerk, and those just before

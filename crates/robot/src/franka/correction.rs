@@ -11,8 +11,8 @@ use crate::arm_state::PERIOD_SECS;
 /// corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
-/// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (which
-/// uses at most 0.4 and 0.2 of them).
+/// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (a free
+/// motion uses at most 0.4 and 0.2 of them).
 const SHARE: f64 = 0.3;
 /// Number of equal steps in which a correction is compared with the limits.
 const NUM_SAMPLES: u32 = 20;
@@ -46,7 +46,8 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// Creates the shortest correction of a deviation within the limits; the longest one if there is none.
+    /// Creates the correction of a deviation: the shortest one within the limits, or the longest one if none is within
+    /// them.
     pub(super) fn new(deviation: Deviation, limits: &Limits) -> Self {
         let lasting = |doublings| Self::lasting(&deviation, SHORTEST_SECS * 2_f64.powi(doublings));
         let longest = lasting(MAX_DOUBLINGS);

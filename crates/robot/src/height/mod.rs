@@ -5,8 +5,8 @@
 //! --mark-height-mm ─ GivenHeight ─────────────────────┴─ settle ─ the more certain of both; an error if they contradict each other
 //! ```
 //! **Frames.** All heights are z of the plane of the marks, in the robot's base frame. A picture shows a part in an
-//! assumed plane; for another plane, position, size and opening of the part scale about the point vertically below the
-//! camera.
+//! assumed plane; for another plane, position, size and jaw width of the part scale about the point vertically below
+//! the camera.
 //!
 //! `sequence/measure.rs` moves the camera and takes the pictures.
 
@@ -52,8 +52,8 @@ impl HeightMeasurement {
         }
     }
 
-    /// Combines the height of the marks measured by the part itself with that measured by the surface beside it. If
-    /// they contradict each other, the height by the part is used.
+    /// Combines the height of the marks from the lines of sight to the part with the height from the surface beside it.
+    /// If they contradict each other, the height from the part is used.
     pub fn combined(&self, by_part: &MeasuredHeight, surface: &MeasuredHeight) -> MeasuredHeight {
         let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
         on_surface.mean(by_part).unwrap_or(*by_part)

@@ -130,8 +130,8 @@ pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<Me
     Ok(MeasuredHeight { height_m: crossing_m, sigma_m: (apart_sigma_m / difference).hypot(relief_m) })
 }
 
-/// Height from two pictures that show several parts, in any order, and the pair of sightings that is most likely one
-/// part; `None` if a picture shows nothing.
+/// Height from two pictures that show several parts, in any order, and the pair of sightings that most likely shows one
+/// and the same part; `None` if a picture shows nothing.
 ///
 /// # Errors
 /// The error of the first pair if no pair gives a height.

@@ -30,8 +30,8 @@ pub struct SafetyLimits {
     pub table_height_m: f64,
     /// Distance of the finger tips beyond the tcp, m.
     pub fingertip_beyond_tcp_m: f64,
-    /// Minimum height of hand, wrist and elbow above the table, m. [`sdg_kinematics::ArmGeometry::clearance`] defines
-    /// these parts.
+    /// Minimum height of finger tips, hand, wrist and elbow above the table, m.
+    /// [`sdg_kinematics::ArmGeometry::clearance`] defines these parts.
     pub min_table_clearance_m: f64,
     /// Minimum distance between two of the arm's own bodies, m.
     pub min_self_distance_m: f64,

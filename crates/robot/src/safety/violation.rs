@@ -71,7 +71,7 @@ pub enum Violation {
         found_mm: f64,
         min_mm: f64,
     },
-    /// A hand that came down by contact, lower than the limits allow, does not move straight up.
+    /// A hand that descended to a contact lower than the limits allow does not move straight up.
     #[error(
         "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} \
          mm beside the vertical path and {down_mm:.1} mm lower than before"

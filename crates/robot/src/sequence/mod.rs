@@ -45,8 +45,8 @@ pub use placing::{PlacingConfig, PlacingOutcome, PlacingReport, grasp_and_place}
 
 use held_part::HeldPart;
 
-/// Minimum height of the arm above the table during free motions, m; less if the destination is lower or, with
-/// obstacles in the cell, the start.
+/// Minimum height of the arm above the table during free motions, m; less if the destination is lower, or if the start
+/// is lower and there are obstacles in the cell.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
 /// Time that the arm stands still before a picture, s.
 const SETTLE_SECS: f64 = 0.25;
@@ -104,7 +104,7 @@ pub fn grasp<A: Arm>(
     Ok(sequence.grasp_report(outcome))
 }
 
-/// As [`grasp`], with a compliant arm, which descends by [`GraspConfig::soft_approach`] if that is given.
+/// As [`grasp`], with a compliant arm, which descends as [`GraspConfig::soft_approach`] describes if that is given.
 ///
 /// # Errors
 /// As for [`grasp`].

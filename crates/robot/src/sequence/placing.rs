@@ -1,4 +1,4 @@
-//! Puts the held part down, by contact instead of height, and checks its position with a picture.
+//! Puts the held part down until a contact is measured, not to a given height, and checks its position with a picture.
 //!
 //! ```text
 //! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the limits
@@ -249,7 +249,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::PutDown, why))
     }
 
-    /// Opens the hand and moves up; returns `part_from_tcp`, the tcp's pose in the part's frame by the detection.
+    /// Opens the hand and moves up; returns `part_from_tcp`, the tcp's pose in the part's frame according to the
+    /// detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
         self.begin(GraspStep::Release)?;
         let opening_m = self.release_opening_m(placing);

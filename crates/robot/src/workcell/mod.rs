@@ -11,7 +11,7 @@
 //! fingertip_beyond_tcp_mm = 9.0     # distance of the finger tips beyond the tcp
 //! grasp_force_n = 40.0
 //! part_mass_kg = 0.2                # given to the controller while the part is held
-//! part_radius_mm = 60               # extent of the part from its grasp, which is kept away from the obstacles
+//! part_radius_mm = 60               # extent of the part from its grasp; the held part is kept away from the obstacles
 //!
 //! [camera]
 //! file = "camera.yaml"              # beside this file; --camera sets it too

@@ -183,8 +183,8 @@ impl TrajectoryArm {
     }
 }
 
-/// The error to report for a motion that failed with `error` and was then cancelled. If the cancellation of a stopped
-/// motion failed, that error is reported, because the robot may still move.
+/// The error to report for a motion that failed with `error` and was then cancelled. If a stopped motion could not be
+/// cancelled, the error of the cancellation is reported, because the robot may still move.
 fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
     match (error, cancelled) {
         (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,

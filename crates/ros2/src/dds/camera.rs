@@ -27,7 +27,8 @@ const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 pub struct TopicAddress {
     /// The topic.
     pub topic: String,
-    /// Whether the topic has CompressedImage instead of Image; also if its name ends with `/compressed`.
+    /// Whether the topic has CompressedImage instead of Image: by the option, or because its name ends with
+    /// `/compressed`.
     pub is_compressed: bool,
     /// Whether lost pictures are sent again.
     pub is_reliable: bool,
