@@ -1,9 +1,9 @@
 """The network of the details, and its export for crates/shape. Usage: details_net.py FILE.pt... OUT.safetensors [--parity]
 
-Writes the weights of train_details.py in half precision, with batch norms folded in; for several trainings their mean,
-which is valid if one started from the weights of the other. `--parity` prints the log-odds that the test of
-crates/shape/src/details/network.rs expects: of two generated inputs, with the weights in half and the sums in double
-precision.
+Writes the weights of train_details.py in half precision, with batch norms folded in; if several FILE.pt are given,
+writes the mean of their weights, which is valid if one training started from the weights of the other. `--parity` prints
+the log-odds that the test of crates/shape/src/details/network.rs expects: of two generated inputs, with the weights in
+half and the sums in double precision.
 
 Legend: B pairs, N = 128 pixels per side of the input, C = 16 cells per side. The input [B, 8, N, N] is photo RGB, picture
 RGB, in the outline (0 or 1), picture valid (0 or 1). The answer [B] has the log-odds that the picture shows the part;
@@ -43,8 +43,8 @@ def cells_inside(inside):
 
 
 def pooled(x, cells, inside):
-    """Inputs of the answer: mean and maximum of channels, and of cells a quarter of the largest log-odds and the
-    mean probability.
+    """Inputs of the answer: the mean and the maximum of each channel; of the cells, a quarter of the largest log-odds
+    and the mean probability.
     """
     m = cells_inside(inside)
     largest = torch.where(m, cells, torch.full_like(cells, NO_CELL)).flatten(1).amax(1)

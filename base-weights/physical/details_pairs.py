@@ -22,12 +22,12 @@ MIX = (0.40, 0.30, 0.16, 0.04, 0.05, 0.05)
 MIN_INSIDE = 0.3  # minimum fraction of a counted cell inside the outline
 MIN_CHANGE = 0.05  # minimum mean change of an edited cell that counts as different
 MIN_DOUBT = 0.015  # minimum mean change of an edited cell that does not count as the same
-BAR_SHARE = 0.08  # of right pairs and look-alikes
-THING_SHARE = 0.15  # of right pairs and look-alikes: another object covers the part
+BAR_SHARE = 0.08  # fraction of right pairs and look-alikes with bars across the part
+THING_SHARE = 0.15  # fraction of right pairs and look-alikes that another object covers
 COARSE_SHARE = 0.25  # of pairs whose picture is small, half of them with a small photo
 SHADE_SHARE = 0.15  # of pictures with the edge of a shadow
-MAX_RIVAL_COVER = 0.12  # of a look-alike: more may hide the difference
-MAX_COVER = 0.45  # of the part
+MAX_RIVAL_COVER = 0.12  # maximum covered fraction of a look-alike: more may hide the difference
+MAX_COVER = 0.45  # maximum covered fraction of the part
 LARGE_ERROR_SHARE, LARGE_ERROR = 0.25, 2.5  # fraction of poses with a larger error, and its factor
 
 

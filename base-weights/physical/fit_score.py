@@ -1,7 +1,7 @@
-"""Fits the score's terms of the close comparison, on candidates with ground truth. Usage: fit_score.py RECORDS.jsonl ...
+"""Fits the score's terms of the close look, on candidates with ground truth. Usage: fit_score.py RECORDS.jsonl ...
 
 `sdg evaluate --split FILE --sets DIR --tuned --records RECORDS.jsonl` writes the records. A logistic regression combines
-the sum of the bounded terms with the five terms of the close comparison; each set has the same weight, and so have its
+the sum of the bounded terms with the five terms of the close look; each set has the same weight, and so have its
 right and its wrong poses. For the printed counts each set is judged by a fit on the other sets; the last line is the
 fit on all sets. Look-alikes other than mirror images are judged but not used for fitting.
 

@@ -30,7 +30,7 @@ from scatter import scatter
 from scene import SLOTS, Scene, make_light, stream
 
 MAX_OUTLINE_POINTS = 60
-MAX_COVERED = 0.25  # of a part, by clutter
+MAX_COVERED = 0.25  # maximum fraction of a part that clutter covers
 OPTIONAL_HIDDEN = 0.4  # an instance is optional if more than this fraction of it is invisible
 
 

@@ -32,7 +32,7 @@ class Faults:
         )
 
 
-MAX_ITEM_LUMINANCE = 0.65  # of the 60th percentile over the objects on the table; 1 is the sensor's limit
+MAX_ITEM_LUMINANCE = 0.65  # limit of the 60th percentile over the objects on the table; 1 is the sensor's limit
 
 
 def develop(rng, cam, x, faults, ground, things, coloured_light=False, exposure=None, noise_gain=1.0):

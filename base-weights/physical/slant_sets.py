@@ -1,9 +1,10 @@
-"""Warps a set of pictures to the views of a camera that has moved around the middle of each scene, and its truth with them.
+"""Warps a set of pictures and its ground truth to the views of a camera that has moved around the middle of each scene.
 
 usage: slant_sets.py SET OUT TILT_DEG [--seed 1] [--lens-deg 49]
 
-SET has demo.*, truth.json and pictures, as shared/real and shared/physical. The table is taken as a plane. The lens sees this angle
-across the longer side. The azimuth of each picture follows from the seed and the picture's name, and is the same at every tilt.
+SET has demo.*, truth.json and pictures, as shared/real and shared/physical. The table is taken as a plane.
+`--lens-deg` is the lens's field of view across the longer side. The azimuth of each picture follows from the seed and
+the picture's name, and is the same at every tilt.
 """
 import argparse
 import json

@@ -19,7 +19,7 @@ class Detection(edge.Detector):
         return self.detect(images)
 
     def pool(self, features, boxes, size):
-        """Like the detector's own, but without the test whether a level has any box, because a trace keeps only one result."""
+        """Pools like the detector, but without the test whether a level has any box: a trace keeps only one result."""
         rois = F.pad(boxes[0], (1, 0))
         areas = (rois[:, 3] - rois[:, 1]) * (rois[:, 4] - rois[:, 2])
         levels = torch.floor(4 + torch.log2(areas.sqrt() / 112 + 1e-8)).clamp(2, 5).long() - 2

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! sdg-bench compare ─┬─ sdg-bench work NAME ─────── our side      they compute alternately; each is a
-//!                    ├─ python peers/worker.py ──── a peer        process of its own, so that its peak
+//!                    ├─ python peers/worker.py ──── a peer        separate process, so that its peak
 //!                    └─ …                                         memory is measured separately
 //!         │
 //!         └─ medians ─ target/bench/peers.json, a table, benches/RESULTS.md

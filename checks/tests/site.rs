@@ -23,7 +23,7 @@ fn site() -> PathBuf {
         .expect("target/site, which `make site` makes")
 }
 
-/// The book's pages by their path in the site; the detector has tests of its own.
+/// The book's pages by their path in the site; the detector's page (crates/web) has its own tests.
 fn pages() -> BTreeMap<String, String> {
     fn collect(folder: &Path, pages: &mut BTreeMap<String, String>) {
         for entry in fs::read_dir(folder).unwrap() {

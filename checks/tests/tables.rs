@@ -93,8 +93,8 @@ fn every_measurement_and_part_is_used_and_every_path_exists() {
     assert!(missing.is_empty(), "checks/tables.toml names files that do not exist: {missing:?}");
 }
 
-/// A repository of its own: the check must find a table that became old, and only when the program on which it depends
-/// computes something else.
+/// In a temporary repository, the check must find a table that became old, and only when the program on which it
+/// depends computes something else.
 #[test]
 fn a_planted_old_table_is_found() {
     let folder = tempfile::tempdir().unwrap();

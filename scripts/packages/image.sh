@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Makes an OCI image for users, target/packages/image/single-demo-grasp-VERSION-amd64.oci.tar: the system of the Slurm
-# image, and in /usr the contents of the packages; the user is not root, the folder is /data. Then programs run in the
-# unpacked image as for a user, without network; if the machine allows no namespaces, this step is skipped with a
-# message. `make image`.
+# image, and in /usr the contents of the packages; the user is not root, and the working folder is /data. Then programs
+# run in the unpacked image as for a user, without network; if the machine allows no namespaces, this step is skipped
+# with a message. `make image`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs a package in a clean Debian root without network, uses it not as root, and removes it; then installs its recommended
-# packages and rehearses a grasp. Prints seconds. Usage: try_deb.sh PACKAGE
+# Installs a package in a clean Debian root without network, uses it as a user other than root, and removes it; then
+# installs its recommended packages and rehearses a grasp. Prints seconds. Usage: try_deb.sh PACKAGE
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Shows that semver.sh finds a break: compares sdg-geometry at HEAD with itself, then with a copy in which a public function has another
-# name. In a worktree of its own. Usage: try_semver.sh
+# name. It works in a separate worktree. Usage: try_semver.sh
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

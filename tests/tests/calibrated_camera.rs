@@ -95,7 +95,7 @@ fn parts_are_found_in_metres_from_other_places_and_through_other_lenses_and_othe
     assert_other_sizes_are_refused(&models);
 }
 
-/// From other positions, and through other lenses.
+/// Asserts that parts are found from other positions and through other lenses.
 fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
     let mut errors = Vec::new();
     for (part, model) in models {

@@ -55,7 +55,7 @@ fn tracked(address: &str, perception: impl FnOnce(&TableCamera, &ObjectSpec) -> 
     Sequence { part, frames }
 }
 
-/// Without a calibrated camera.
+/// The perception without a calibrated camera.
 fn by_picture(_: &TableCamera, part: &ObjectSpec) -> Perception {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;
@@ -63,7 +63,7 @@ fn by_picture(_: &TableCamera, part: &ObjectSpec) -> Perception {
     Perception::of_any_camera(taught(shipped::demonstration(&part.name).unwrap(), &options))
 }
 
-/// With a calibrated camera: in the plan view of the marks' plane, and in metres.
+/// The perception with a calibrated camera: in the plan view of the marks' plane, and in metres.
 fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> Perception {
     let over_table = |camera| CameraOverTable { camera, table_height_m: 0.0, workspace: None };
     let shown = demonstration_view(part).unwrap();

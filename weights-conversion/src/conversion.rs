@@ -248,8 +248,8 @@ fn move_background(rows: usize, to: Background) -> Vec<Option<usize>> {
     }
 }
 
-/// The rows of all classes without the background's own rows, or with rows of zeros in their place, which come first
-/// and are unused.
+/// The rows of all classes, either without the background's rows, or with rows of zeros for the background, which come
+/// first and are unused.
 fn drop_or_add_background(
     rows: usize,
     num_rows: usize,

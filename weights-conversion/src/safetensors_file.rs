@@ -11,8 +11,8 @@ use crate::error::{Result, WeightsError, printable};
 use crate::source::{Source, Span};
 use crate::tensor::{Encoding, Payload, StoredTensor};
 
-/// Maximum size of a header; a detector's header has about 50 kB. Parsed, `[0,0,…` takes about ten times its bytes in
-/// memory.
+/// Maximum size of a header; a detector's header has about 50 kB. After parsing, an array such as `[0,0,…]` takes about
+/// ten times as much memory as its text.
 const MAX_HEADER_BYTES: u64 = 4 << 20;
 
 /// Tensors by name, and metadata by name.

@@ -8,7 +8,7 @@ pub struct Machine {
     pub processor: String,
     /// Number of cores that this process may use.
     pub cores: usize,
-    /// The SIMD instruction sets that it has, of those that matter for the measurements.
+    /// The processor's SIMD instruction sets that matter for the measurements.
     pub instructions: String,
     pub memory_gib: f64,
     /// The measured commit, with a plus sign if files differ from it.

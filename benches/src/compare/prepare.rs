@@ -108,8 +108,7 @@ impl Paths {
     fn weights(&self, network: Network) -> Result<PathBuf> {
         let path = self.out.join("weights").join(format!("{}.safetensors", network.name()));
         if !path.exists() {
-            // In a process of its own, so that its memory does not count for another
-            // process.
+            // In a separate process, so that its memory does not count for another process.
             let mut command = Command::new(std::env::current_exe()?);
             run(command.args(["weights", network.name()]).arg(&path))?;
         }

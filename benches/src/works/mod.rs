@@ -50,8 +50,7 @@ mod tests {
         for work in WORKS.iter().chain([&GEMM]) {
             let args =
                 WorkArgs { name: work.name.to_owned(), weights: None, demonstration: None, model: None, threads: 2 };
-            // A work without its files is rejected because of them, not because of its
-            // name.
+            // If the files of a work are missing, the error is about the files and not about the name.
             let refused = build(&args).err().map(|error| error.to_string());
             assert!(refused.is_none_or(|error| !error.contains("expected a work")), "{}", work.name);
         }

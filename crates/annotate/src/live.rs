@@ -187,7 +187,7 @@ mod tests {
         assert!(matches!(desk.frame(1), Err(Error::NoSuchFrame { number: 1 })));
         assert_eq!(desk.frame(2).unwrap().get_pixel(0, 0)[0], 2);
         assert!(desk.frame(9).is_ok());
-        assert!(desk.frame(10).is_err(), "nobody has seen it");
+        assert!(desk.frame(10).is_err(), "this frame was never shown");
     }
 
     #[test]

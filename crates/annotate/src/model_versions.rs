@@ -189,7 +189,7 @@ mod tests {
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), versions.current), ("second", Some(1)));
         assert_eq!(versions.use_version(&path, 0).unwrap(), b"first");
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), versions.current), ("first", Some(0)));
-        assert_eq!(texts().len(), 3, "what is kept is not kept twice");
+        assert_eq!(texts().len(), 3, "a version that is kept already is not copied again");
         assert!(versions.use_version(&path, 2).unwrap_err().to_string().contains("below 2, found 2"));
     }
 }

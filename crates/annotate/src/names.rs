@@ -8,7 +8,8 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The natural order of two names, as the page's: numbers by value (2 before 10), letters without regard to case.
+/// The natural order of two names, the same as on the page: numbers by value (2 before 10), letters without regard to
+/// case.
 pub fn natural_order(a: &str, b: &str) -> Ordering {
     pieces(a).cmp(pieces(b)).then_with(|| a.cmp(b))
 }
@@ -17,9 +18,9 @@ pub fn natural_order(a: &str, b: &str) -> Ordering {
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Piece<'a> {
     Sign(char),
-    /// The number of digits without leading zeros, and these digits: of any length.
+    /// The number of digits without leading zeros, and these digits. There may be any number of them.
     Number(usize, &'a str),
-    /// Of lower case.
+    /// A letter, in lower case.
     Letter(char),
 }
 

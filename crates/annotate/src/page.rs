@@ -190,7 +190,7 @@ mod tests {
         let texts = || FILES.iter().map(|&(.., text)| text).chain([INDEX]);
         for (name, ..) in FILES {
             let (imported, linked) = (format!("\"./{name}\""), format!("\"/page/{name}\""));
-            assert!(texts().any(|text| text.contains(&imported) || text.contains(&linked)), "nobody asks for {name}");
+            assert!(texts().any(|text| text.contains(&imported) || text.contains(&linked)), "no file uses {name}");
         }
         for text in texts() {
             for line in text.lines().filter(|line| line.starts_with("import ")) {

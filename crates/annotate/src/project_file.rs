@@ -218,7 +218,7 @@ impl ProjectFile {
         Ok((file, gone))
     }
 
-    /// Keeps the names of missing files, after the existing ones.
+    /// Appends the names of the missing files, so that the project still contains them.
     pub fn keep_missing(&mut self, gone: &Gone) {
         let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
         let photos: Vec<String> = photos.cloned().collect();

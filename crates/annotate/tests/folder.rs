@@ -34,7 +34,7 @@ fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
     let first = session(&served);
     assert_eq!((&first["label"], &first["is_named"]), (&json!("rod"), &json!(false)), "the photo's name is proposed");
     assert_eq!(names(&first["others"]), ["other.png", "table.png"]);
-    assert!(!served.folder.path().join("rod.sdg-project.json").exists(), "a look leaves nothing behind");
+    assert!(!served.folder.path().join("rod.sdg-project.json").exists(), "opening a photo writes no file");
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
     teach(&served);
     served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
@@ -137,7 +137,7 @@ fn the_copy_of_a_tried_picture_is_not_offered_for_trying() {
 #[test]
 fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
     let served = Served::of_project(folder_of(&["a.png"]));
-    assert_eq!(names(&session(&served)["images"]), ["a.png"], "where there is one picture, there is no choice");
+    assert_eq!(names(&session(&served)["images"]), ["a.png"], "a single picture becomes the photo without a choice");
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
     teach(&served);
     let folder = served.end();
@@ -201,7 +201,7 @@ fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     assert_eq!((&start["recent"], &start["folder"]), (&json!([]), &json!(served.folder.path().display().to_string())));
     assert_eq!(served.ask("GET", "/api/teaching", b"").status, 409);
     assert_eq!(served.ask("POST", "/api/projects?name=wing%20bolt&photo=IMG_1.png", b"no picture").status, 422);
-    assert!(!served.folder.path().join("wing_bolt").exists(), "nothing is left of what failed");
+    assert!(!served.folder.path().join("wing_bolt").exists(), "no folder remains of a project that failed");
     let made = served.ask("POST", "/api/projects?name=wing%20bolt&photo=IMG_1.png", &photo_png()).json();
     assert_eq!(
         (&made["label"], &made["is_named"], names(&made["images"])),

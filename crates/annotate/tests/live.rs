@@ -73,7 +73,7 @@ fn a_page_without_photos_takes_the_frame_that_was_shown() {
     assert_eq!((&taken["id"], &taken["name"]), (&json!(0), &json!("photo.png")));
     let written = image::open(served.folder.path().join("photo.png")).unwrap().into_rgb8();
     assert_eq!(written, photo(), "as PNG, without loss");
-    assert_eq!(post(&served, "/api/live/8/photo").status, 404, "nobody has seen frame 8");
+    assert_eq!(post(&served, "/api/live/8/photo").status, 404, "frame 8 was not shown yet");
 
     // A second photo gets a number, and the first one is kept.
     assert_eq!(get(&served, "/api/live")["next_photo"], "photo-2.png");

@@ -130,7 +130,7 @@ impl Camera for Reconnecting {
                 self.num_stalls += 1;
                 let silent_secs = self.last_frame.elapsed().as_secs_f64();
                 if self.num_stalls >= MAX_STALLS {
-                    return Err(self.lose(format!("no frame for {silent_secs:.1} s, so it is reopened")));
+                    return Err(self.lose(format!("no frame for {silent_secs:.1} s, so the camera is reopened")));
                 }
                 Err(fault(&self.name, Fault::Stale { silent_secs }))
             }

@@ -188,7 +188,7 @@ fn what_the_camera_does_not_have_is_refused() {
     let error = refused(&format!("v4l:{}", vivid().path.display()), &mjpeg);
     assert!(error.contains("expected the format MJPG") && error.contains("YUYV"), "{error}");
     let error = refused("v4l:no such card", &OpenOptions::default());
-    assert!(error.contains("vivid"), "what there is, is named: {error}");
+    assert!(error.contains("vivid"), "the available cameras are not named: {error}");
 }
 
 /// Options for this test's webcam.

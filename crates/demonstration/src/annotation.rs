@@ -27,8 +27,8 @@ pub struct ImageFacts<'a> {
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// The image's path or file name, by which a COCO file of several images is searched; the folders decide among
-    /// images of the same name.
+    /// The image's path or file name, which selects the image in a COCO file of several images; the folders decide
+    /// among images of the same name.
     pub file_name: Option<&'a str>,
 }
 

@@ -34,7 +34,7 @@ impl DataYaml {
                 .ok()
                 .filter(|[count, stride]| items.len() == 2 && (1..=10_000).contains(count) && [2, 3].contains(stride));
             let found = items.iter().map(|(_, item)| item.as_str()).collect::<Vec<_>>().join(", ");
-            let expected = "keypoints and numbers a keypoint, such as [2, 3]";
+            let expected = "keypoints and numbers per keypoint, such as [2, 3]";
             data.keypoint_shape = Some(shape.ok_or_else(|| malformed("kpt_shape", expected, &found))?);
         }
         for (place, (key, name)) in entry(text, "names").unwrap_or_default().into_iter().enumerate() {

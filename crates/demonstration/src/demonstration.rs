@@ -22,7 +22,7 @@ pub struct Demonstration {
 impl Demonstration {
     /// Reads a photo and its annotation, which must mark one object.
     ///
-    /// `file_name` is the photo's, by which a COCO file of several images is searched.
+    /// `file_name` is the photo's path or file name, which selects the image in a COCO file of several images.
     ///
     /// # Errors
     /// The errors of [`decode_image`] and [`Annotation::read`], and several objects.

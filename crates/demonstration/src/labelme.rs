@@ -75,7 +75,7 @@ struct Shape {
     label: String,
     group: Option<String>,
     points: Vec<Point2<f64>>,
-    /// Only in the grasp's start: LabelMe keeps unknown fields.
+    /// A field of the shape `grasp_start` only: LabelMe keeps fields that it does not know.
     jaw_width: Option<(f64, String)>,
     optional: bool,
     place: String,

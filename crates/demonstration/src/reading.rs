@@ -1,5 +1,5 @@
-//! Whether marks fit a photo as they are, or in another reading: at twice the size, with x and y exchanged, as
-//! percentages.
+//! Whether marks fit a photo as they are, or in another reading: at half or twice the size, with x and y exchanged, or
+//! as percentages.
 //!
 //! Only pixels can decide, because half of a coordinate is also a coordinate. An outline fits if colours change across
 //! its border and differ inside from those around it. A box contains background, and the part touches its border only
@@ -15,14 +15,15 @@ use crate::Annotation;
 /// the shipped demonstrations) is refused, neither with outlines nor with boxes alone. At 3, 56 of 57 intentionally
 /// wrong outlines and 126 of 144 wrong boxes are refused.
 const MIN_GAIN: f64 = 3.0;
-/// Minimum colour difference of marks around a part. It is smaller where one mixture of colours is inside and outside,
-/// such as on a plain background. The smallest difference in these 62 photos is 0.99 for an outline and 0.29 for a box.
+/// Minimum colour difference of marks around a part. It is smaller where the inside and the outside have the same
+/// mixture of colours, such as on a plain background. The smallest difference in these 62 photos is 0.99 for an outline
+/// and 0.29 for a box.
 const MIN_DIFFERENCE: f64 = 0.15;
 /// Minimum contrast at the border, in grey values, of marks that may be right although their colour difference is
 /// small: they may follow elements of a pattern. The value is above a camera's noise.
 const MIN_CONTRAST: f64 = 20.0;
 /// Dark photos and those of low contrast have one mixture of colours everywhere: the first and the ninety-ninth
-/// percentile of their grey values differ by less. A photo at 30 % of its brightness has at most 76.
+/// percentile of their grey values differ by less than this. A photo at 30 % of its brightness has at most 76.
 const MIN_RANGE: f64 = 100.0;
 /// Marks on more of the photo than this belong to a crop: their surroundings carry no information. Chosen by hand.
 const MAX_COVER: f64 = 0.5;

@@ -11,7 +11,8 @@ const OPENDR_KEYPOINTS: &[u8] = include_bytes!("formats/kps_train.npy");
 /// The annotation from which all these files were made.
 const ORIGINAL: &[u8] = include_bytes!("../../../datasets/demonstrations/fuel_line/annotation.json");
 
-/// Ultralytics writes fractions of the image with six digits: 640 · 5e-7 pixels, with the box's width counted in.
+/// Ultralytics writes fractions of the image with six digits: an error of up to 640 · 5e-7 pixels in a position, and of
+/// half of that from the box's width.
 const YOLO_ROUNDING_PX: f64 = 7e-4;
 
 fn facts(file_name: &str) -> ImageFacts<'_> {

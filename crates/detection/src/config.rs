@@ -130,7 +130,7 @@ pub enum StrideIn {
     Conv3x3,
 }
 
-/// The part of the backbone that is never trained.
+/// The part of the detector that is never trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Freeze {
     /// Everything is trained.

@@ -55,7 +55,7 @@ impl RcnnConfig {
         check(
             self.backbone.num_blocks.iter().all(|n| *n > 0),
             "backbone.num_blocks",
-            "at least one block a stage",
+            "at least one block per stage",
             format!("{:?}", self.backbone.num_blocks),
         )?;
         check(

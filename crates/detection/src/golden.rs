@@ -252,7 +252,7 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Compares positions and scores of the reference's `[N, K, 3]`, which have separate tolerances.
+    /// Compares the keypoints with the reference's `[N, K, 3]`; positions and scores have separate tolerances.
     fn keypoints(&mut self, found: &Detections) {
         let name = "detections.keypoints";
         if self.recorded.is_some() {

@@ -1,8 +1,8 @@
 //! Reads tensors from the device, for the steps on the host (top-k, NMS, decoding).
 //!
 //! Inference is written asynchronously, because a browser gives the results of its graphics card only to asynchronous
-//! code. Elsewhere burn's `read_sync` makes an ordinary function of it; in a browser with a graphics card that function
-//! panics.
+//! code. Elsewhere burn's `read_sync` waits for the result of such a function; in a browser with a graphics card
+//! `read_sync` panics.
 
 use burn::tensor::{Tensor, Transaction, read_sync};
 

@@ -322,7 +322,7 @@ mod tests {
             assert_eq!(scores[2 * row + 1], 0.0);
         }
 
-        // The keypoint's kernel adds the product of the descriptor with the map, doubled like the interpolation, except
+        // The keypoint's kernel adds the product of the descriptor and the map, doubled by linear interpolation, except
         // near the border, where the transposed convolution reads zeros.
         let [head, own_head] = [&detector, &imprinted].map(|d| d.roi_heads.keypoint_head.as_ref().unwrap());
         let maps = head.hidden(&features, &rois);

@@ -51,8 +51,10 @@ impl Slant {
         Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
     }
 
-    /// The foreshortening at a position of the picture: over all directions of a short line, ln of its longest over its
-    /// shortest length, and the direction of the shortest. `None` as for [`Self::level_from_picture`].
+    /// The foreshortening at a position of the picture. A short line of fixed length on the table has different lengths
+    /// in the picture, depending on its direction. The result is the natural logarithm of the ratio of the longest to
+    /// the shortest of these lengths, and the direction of the shortest in the picture. `None` as for
+    /// [`Self::level_from_picture`].
     pub fn shortening_at(&self, seen: Vector2<f64>) -> Option<(f64, Angle)> {
         const STEP_PX: f64 = 0.5;
         let level = self.level_from_picture(seen)?;

@@ -1,7 +1,8 @@
 //! AdamW's update of one parameter, whose gradient is first clipped to a maximum norm.
 //!
-//! Composed of tensor operations, an update reads and writes its moments a dozen times, on one thread: a fifth of the
-//! `edge` preset's training step. Here an update is three passes on all cores: norm, moments, value.
+//! If an update were composed of tensor operations, it would read and write its moments a dozen times, on one thread;
+//! this takes a fifth of the `edge` preset's training step. Here an update is three passes on all cores: norm, moments,
+//! value.
 //!
 //! Source: Loshchilov and Hutter, Decoupled Weight Decay Regularization (2019).
 

@@ -1,10 +1,10 @@
 //! CPU kernels for the most expensive operations of a detector, behind burn's backend extension.
 //!
 //! burn's CPU backend `Flex` runs a convolution forwards at a moderate speed and backwards through a generic fallback,
-//! and it has no ROIAlign. This crate adds faster convolutions, ROIAlign and the other operations that took most of the
-//! training time: most 3×3 convolutions of stride 1 by Winograd's transforms, all others as matrix products that mostly
-//! read the maps in place, group norm, max pooling, upsampling, log-softmax, cosines between maps, AdamW's update, and
-//! non-maximum suppression.
+//! and it has no ROIAlign. This crate adds faster convolutions (most 3×3 convolutions of stride 1 by Winograd's
+//! transforms, all others as matrix products that mostly read the maps in place), ROIAlign, and the other operations
+//! that took most of the training time: group norm, max pooling, upsampling, log-softmax, cosines between maps, AdamW's
+//! update, and non-maximum suppression.
 //!
 //! ```text
 //! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`

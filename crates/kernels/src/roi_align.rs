@@ -37,7 +37,7 @@ pub fn roi_align(features: Tensor<4>, rois: Tensor<2>, params: RoiAlignParams) -
     assert!(columns == 5, "roi_align: expected ROIs of [R, 5] (image index, x1, y1, x2, y2), found {:?}", rois.dims());
     assert!(
         params.output_size.iter().all(|&bins| bins > 0),
-        "roi_align: expected at least one bin an axis, found {:?}",
+        "roi_align: expected at least one bin per axis, found {:?}",
         params.output_size
     );
     assert!(

@@ -53,8 +53,8 @@ impl CropWindow {
         self.center + self.x_axis() * (scale * (in_crop.x - half)) + self.y_axis() * (scale * (in_crop.y - half))
     }
 
-    /// Resamples the window to `size_px` × `size_px` pixels. When reducing by up to eight, it averages over each
-    /// pixel's whole area, so a crop of a large image looks like a crop of a small image.
+    /// Resamples the window to `size_px` × `size_px` pixels. When reducing by a factor of up to eight, it averages over
+    /// each pixel's whole area, so a crop of a large image looks like a crop of a small image.
     pub fn read(&self, image: &RgbImage, size_px: u32) -> RgbImage {
         let scale = self.side / f64::from(size_px);
         let taps = (scale.ceil() as usize).clamp(1, MAX_TAPS);

@@ -79,8 +79,8 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 /// # Errors
 /// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
 /// file, zero width or height, more than `limits.max_pixels` (PPM: also more than 64 megapixels, a side above 16384
-/// pixels or values above 255), a TIFF with several full-size pages, raw data or a palette that has not 8 bits, or a
-/// CMYK JPEG for which it is unknown whether the inks are inverted.
+/// pixels or values above 255), a TIFF with several full-size pages, with raw data or with a palette that does not have
+/// 8 bits, or a CMYK JPEG for which it is unknown whether the inks are inverted.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         return ppm::decode_ppm(bytes, |width, height| check_size(width, height, limits));

@@ -361,7 +361,7 @@ mod tests {
             let [large, small] = [rgb([8, 6], [10, 20, 30], 0), rgb([4, 3], [9, 9, 9], 1)];
             assert_eq!(decoded(&file(&[large, small], is_big)).unwrap().dimensions(), (8, 6));
         }
-        // A thumbnail alone is used.
+        // A thumbnail is used if there is no full-size page.
         assert_eq!(decoded(&file(&[rgb([4, 3], [9, 9, 9], 1)], false)).unwrap().dimensions(), (4, 3));
     }
 

@@ -167,7 +167,7 @@ impl AnimationRecorder {
 struct Economy {
     /// Maximum number of colours in the palette; one more entry means "unchanged".
     num_colors: usize,
-    /// Maximum difference of a channel from the displayed one in pixels that count as unchanged.
+    /// Maximum difference of each channel from the displayed value in a pixel that counts as unchanged.
     tolerance: u8,
     /// Every `stride`-th frame is kept, and the last one.
     stride: usize,

@@ -12,7 +12,7 @@ use super::bytes::{SEED_PORT, contains, replaced, split_at_marks};
 use super::pictures::{encoded, picture};
 use crate::target::Target;
 
-/// Separates the answers of one input; each goes to a connection of its own.
+/// Separates the answers of one input; each goes to a separate connection.
 const NEXT_ANSWER: &[u8] = b"\x1enext\x1e";
 /// Far above the time that this computer needs for an answer, and far below [`MAX_SECONDS`](crate::MAX_SECONDS).
 const TIMEOUT: Duration = Duration::from_secs(2);

@@ -19,7 +19,7 @@ use super::cameras::exchange;
 use super::pictures::{encoded, picture};
 use crate::target::Target;
 
-/// The page's key in the seeds.
+/// The page's token in the seeds.
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const MAX_EXTRA_BYTES: usize = 256 << 20;
 /// An idle connection is closed after this time; the program waits half a minute.
@@ -168,7 +168,7 @@ fn kept_open(method: &str, path: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-/// A server with a folder of its own; dropping it stops the server.
+/// A server with its own folder; dropping this value stops the server.
 struct Serving {
     port: u16,
     _folder: tempfile::TempDir,
@@ -196,7 +196,7 @@ fn asked(bytes: &[u8], kept: &Mutex<Option<Serving>>, serve: fn() -> Serving) ->
     );
     assert!(
         !is_answered || contains(&request, TOKEN.as_bytes()),
-        "expected a refusal, found an answer to a request without the key"
+        "expected a refusal, found an answer to a request without the token"
     );
     // After any change, the next execution gets a new server. A server is reused after a single request that only
     // reads.
@@ -282,7 +282,7 @@ impl LivePictures for Still {
     }
 }
 
-/// A teacher that teaches and opens no model: models have targets of their own.
+/// A teacher that refuses to teach and to open models, because other targets test models.
 struct Unwilling;
 
 const REFUSED: &str = "nothing is taught here";

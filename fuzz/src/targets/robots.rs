@@ -63,8 +63,8 @@ pub(super) const FRANKA: Target = Target {
 /// Maximum number of bytes that are requested before they have arrived.
 const MAX_STEP: usize = 8192;
 
-/// Reads the first message of a stream. Asserts that no read requests more than [`MAX_STEP`] bytes or than the message
-/// has, and that the payload takes no more memory than the message has bytes.
+/// Reads the first message of a stream. Asserts that no read requests more than [`MAX_STEP`] bytes, or more bytes than
+/// the message has, and that the payload takes no more memory than the message has bytes.
 pub(super) fn message(bytes: &[u8], kind: HeaderKind) -> Option<(Header, Vec<u8>)> {
     let mut stream = Watched { bytes, largest_buffer: 0 };
     let message = read_message(&mut stream, kind);

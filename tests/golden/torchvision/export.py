@@ -48,7 +48,7 @@ GRADIENTS = [
 
 
 class NarrowResNet(ResNet):
-    """ResNet with a sixteenth of its channels, in the stem a quarter."""
+    """ResNet with a sixteenth of its channels; the stem has a quarter."""
 
     def _make_layer(self, block, planes, blocks, stride=1, dilate=False):
         if planes == 64:

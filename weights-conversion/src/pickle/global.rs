@@ -15,7 +15,7 @@ pub(crate) enum Global {
     NdArray,
     /// Makes a numpy element type.
     Dtype,
-    /// Converts text to bytes (bytes under protocol 2).
+    /// Converts text to bytes; protocol 2 stores bytes in this way.
     CodecsEncode,
     /// Makes empty bytes (protocol 2).
     Bytes,

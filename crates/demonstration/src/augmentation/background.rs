@@ -162,8 +162,8 @@ fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl F
     }
 }
 
-/// Two colours: the first is grey, like wood, of any hue, the part's or the background's; the second is darker or
-/// brighter.
+/// Two colours: the first is a grey, a wood colour, a colour of any hue, or a colour of the part or of the background;
+/// the second is the first, darkened or brightened.
 fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     let level = uniform(rng, 0.05, 0.9);
     let base = match index_below(rng, 6) {

@@ -67,7 +67,7 @@ impl Primitive {
             }
             Self::Gear { radius, teeth, depth } => {
                 let wave = (y.atan2(x) * teeth).cos();
-                // Steepened to flanks; the factor keeps the slope near one.
+                // The wave is steepened, so that the teeth have flanks; the factor keeps the slope near one.
                 (length(x, y) - radius - depth * (3.0 * wave).clamp(-1.0, 1.0)) * 0.8
             }
             Self::Arc { radius, half_angle, half_width } => {

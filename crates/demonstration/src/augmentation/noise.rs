@@ -91,7 +91,7 @@ mod tests {
     fn a_tile_repeats_without_a_seam() {
         let tile = NoiseTile::fractal(&mut sample_rng(3, Stream::Preparation, 0), 4, 3, 0.5);
         assert_eq!(tile.at(10.25, 20.5), tile.at(10.25 - 256.0, 20.5 + 512.0));
-        // Without a seam, each octave changes by at most 1.5 / cell per pixel; 0.02 pixels are between the places.
+        // Without a seam, each octave changes by at most 1.5 / cell per pixel; the two positions are 0.02 pixels apart.
         assert!((tile.at(255.99, 7.0) - tile.at(0.01, 7.0)).abs() < 0.02);
         let mean = tile.values.iter().sum::<f32>() / tile.values.len() as f32;
         assert!((0.35..0.65).contains(&mean), "{mean}");

@@ -36,7 +36,7 @@ pub(crate) fn draw_pose(
             return pose;
         }
     }
-    // A part that fills the photo fits only in this way.
+    // A part that fills the photo fits only in its pose in the photo.
     let shift_x = 0.5 * (width - part.photo_size[0] * part.nominal_scale);
     let shift_y = 0.5 * (height - part.photo_size[1] * part.nominal_scale);
     Homography::translation(shift_x, shift_y).compose(&Homography::scaling(part.nominal_scale))
@@ -50,7 +50,7 @@ fn draw_centered(part: &Prepared, style: &SceneStyle, diagonal: f64, rng: &mut S
     let towards = direction(rng).map(f64::from);
     let squeeze = f64::from(uniform(rng, 0.0, style.max_foreshortening));
     let across_part = f64::from(uniform(rng, 0.0, style.max_perspective));
-    // Far from the part, the horizon must not lie inside the image.
+    // The horizon must not lie inside the image, however far from the part.
     let perspective = (0.5 * across_part / (part.radius * scale)).min(0.4 / diagonal);
     Homography::tilt(Vector2::new(towards[0], towards[1]), squeeze, perspective).compose(&turned)
 }

@@ -13,8 +13,8 @@ use crate::erase::fill;
 use crate::raster::Raster;
 use crate::{Demonstration, NUM_KEYPOINTS};
 
-/// Resolution of the stored photo relative to the output, at most the photo's own: sharp when enlarged, with little
-/// averaging when reduced.
+/// Resolution of the stored photo relative to the output, but at most the photo's own resolution. With this value a
+/// part stays sharp when enlarged, and needs little averaging when reduced.
 const OVERSAMPLING: f64 = 1.25;
 
 /// Rasters are in *prepared* pixels, points in pixels of the demonstration's photo.

@@ -64,7 +64,7 @@ fn a_sample_is_the_same_in_any_order_and_by_any_augmenter() {
         assert!(other.sample(index as u64) == forward[index], "sample {index}");
     }
     assert!(one.held_out(3) == other.held_out(3));
-    assert!(one.held_out(3).image != forward[3].image, "held-out samples are others than those for training");
+    assert!(one.held_out(3).image != forward[3].image, "held-out samples differ from training samples");
     assert!(forward[4].image != forward[5].image);
     let config = AugmentationConfig::default().with_output_size(320, 240);
     let other_seed = Augmenter::new(&[demonstration(true)], config, 12).unwrap();

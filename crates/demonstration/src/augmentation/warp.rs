@@ -80,7 +80,7 @@ impl LanePicture {
     /// Reads the columns of one row of the target, multiplied by the gains, into `out`: three bytes per column.
     /// Beyond the picture, the pixels of its border are repeated.
     pub fn read(&self, row: &RowLine, columns: Range<usize>, gains: &Gains, out: &mut [u8]) {
-        assert_eq!(out.len(), 3 * columns.len(), "three bytes a column");
+        assert_eq!(out.len(), 3 * columns.len(), "three bytes per column");
         if columns.is_empty() {
             return;
         }
@@ -158,7 +158,8 @@ impl RowLine {
     fn fixed(&self) -> FixedLine {
         let one = 2f64.powi(FRACTION_BITS as i32);
         let place = |[u, v]: [f64; 2]| Place { u: (u * one).round() as i64, v: (v * one).round() as i64 };
-        // Half a pixel back to the corner of the four, one forward for the border, and half a weight for rounding.
+        // Minus half a pixel for the upper left of the four pixels, plus one for the border, plus half a weight for
+        // rounding.
         let origin = 0.5 + 0.5 / f64::from(1 << WEIGHT_BITS);
         FixedLine { start: place(self.start.map(|along| along + origin)), step: place(self.step) }
     }

@@ -21,7 +21,7 @@ const DARKEST_SHADE: f32 = 0.5;
 const SHADE_VARIANCE: f32 = 0.3;
 /// As [`DARKEST_SHADE`], for a shadow that a person marked.
 const DARKEST_SHADE_SAID: f32 = 0.3;
-/// Maximum fraction of the lightness that remains in a marked shadow: hardly darker colours are not in shadow.
+/// Maximum fraction of the lightness that remains in a marked shadow: colours that are hardly darker are not in shadow.
 const BRIGHTEST_SAID: f32 = 0.92;
 /// Largest change of a* and b* by other light in a marked shadow.
 const MAX_TINT: f32 = 14.0;

@@ -218,7 +218,7 @@ mod tests {
                 .collect();
             let readout = if cubic { KeypointReadout::BicubicArgmax } else { KeypointReadout::LocalMean { radius: 2 } };
             let read = decode(&logits, 56, &roi, readout, KeypointScore::NormalisedPeak);
-            // Half a cell from encoding, and half a pixel from the resized map.
+            // Encoding has an error of up to half a cell, and the resized map of up to half a pixel.
             let (tx, ty) = (w / 112.0 + 0.51, h / 112.0 + 0.51);
             prop_assert!((f64::from(read.x) - point.x).abs() <= f64::from(tx), "{read:?} {point:?}");
             prop_assert!((f64::from(read.y) - point.y).abs() <= f64::from(ty), "{read:?} {point:?}");

@@ -29,11 +29,12 @@ impl BoxMask {
     /// The mask by [`MaskPasting::PixelCenters`].
     ///
     /// # Source
-    /// Detectron2's `paste_masks_in_image`: bilinear, zeros outside, at least the threshold.
+    /// Detectron2's `paste_masks_in_image`: bilinear, zeros outside; the mask has the pixels with at least the
+    /// threshold.
     fn paste_pixel_centers(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let (x1, y1, x2, y2) = (bounds.x1 as f32, bounds.y1 as f32, bounds.x2 as f32, bounds.y2 as f32);
         let mut mask = Mask::empty(width, height);
-        // A cell extends at most half of its own size beyond the box.
+        // By interpolation an outer cell extends beyond the box, by at most half of its own size.
         let cells = |low: f32, high: f32, extent: u32| -> (u32, Vec<f32>) {
             let reach = (high - low) / self.size as f32;
             let first = (low - reach).floor().clamp(0.0, extent as f32) as u32;
@@ -68,8 +69,9 @@ impl BoxMask {
     /// The mask by [`MaskPasting::WholePixels`].
     ///
     /// # Source
-    /// torchvision's `paste_masks_in_image`: the mask is padded, and its box enlarged by the same factor and truncated
-    /// to whole pixels, including the last ones; above the threshold, as in torchvision's examples.
+    /// torchvision's `paste_masks_in_image`: the mask is padded; its box is enlarged by the same factor, and its
+    /// corners are truncated to whole pixels, which all belong to it. The mask has the pixels above the threshold, as
+    /// in torchvision's examples.
     fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let padded = self.padded();
         let enlarged = padded.size as f32 / self.size as f32;

@@ -176,7 +176,7 @@ mod tests {
         };
         assert_eq!(filled(&triangle), filled(&backwards));
         let area = filled(&triangle).iter().filter(|inside| **inside).count() as f64;
-        // Half of the cross product of two edges, up to one cell along half of the outline.
+        // The area is half of the cross product of two edges. The tolerance is one cell along half of the outline.
         let exact = 0.5 * ((9.6 * 12.3) - (1.8 * 4.8));
         assert!((area - exact).abs() < 8.0, "{area} {exact}");
     }

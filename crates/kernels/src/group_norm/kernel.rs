@@ -90,7 +90,7 @@ pub(crate) fn forward(
             let squares: f64 = moments
                 .map(|(pivot, shift, second)| {
                     let pixels = sizes.pixels as f64;
-                    // First around the channel's mean, then the channel's mean around the group's mean.
+                    // The squares around the channel's mean, plus those of the channel's mean around the group's mean.
                     second - pixels * shift * shift + pixels * (pivot + shift - mean).powi(2)
                 })
                 .sum();

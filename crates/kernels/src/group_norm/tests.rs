@@ -24,7 +24,7 @@ fn run(shape: [usize; 4], params: GroupNormParams, added: bool, dtype: DType) ->
         (values + offset).cast(dtype)
     };
     let len = shape.iter().product();
-    // Far from centred, so that a careless variance would lose its digits.
+    // The mean is far from 0, so that a variance computed carelessly would lose its digits.
     let x = make(len, 1, 20.0).reshape(shape).require_grad();
     let gamma = make(shape[1], 2, 1.0).require_grad();
     let beta = make(shape[1], 3, 0.0).require_grad();

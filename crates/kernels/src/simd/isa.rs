@@ -10,7 +10,7 @@ pub(crate) enum Isa {
     #[cfg(target_arch = "x86_64")]
     Avx2,
     /// NEON, which every aarch64 has, and WebAssembly's, whose presence is fixed when a module is compiled, because a
-    /// page cannot query it from inside.
+    /// running module cannot query it.
     #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
     Quads,
     Portable,

@@ -80,7 +80,7 @@ impl Scene {
     }
 
     /// Intersects the lines of sight of a box of pixels with a body and keeps the nearest contacts; `tell` is called
-    /// for each pixel, row by row, with whether it meets the body.
+    /// for each pixel, row by row; its argument is true if the pixel's line of sight meets the body.
     fn meet_all(
         &self,
         idx: usize,

@@ -127,11 +127,11 @@ impl TrainingConfig {
             && !((0.0..1.0).contains(&share) && batch_size > 0)
         {
             let found = format!("a share of {share} with batches of {batch_size}");
-            return refuse("windows", "a share in [0, 1) with at least one a batch", found);
+            return refuse("windows", "a share in [0, 1) and at least one window per batch", found);
         }
         if self.validation.every == 0 || self.validation.samples == 0 {
             let found = format!("every {} steps on {} samples", self.validation.every, self.validation.samples);
-            return refuse("validation", "at least every step on one sample", found);
+            return refuse("validation", "an interval of at least 1 step, and at least 1 sample", found);
         }
         if !(self.schedule.peak > 0.0 && self.schedule.peak.is_finite()) {
             return refuse("learning rate", "a positive number", self.schedule.peak.to_string());

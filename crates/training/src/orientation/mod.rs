@@ -24,9 +24,10 @@
 //! | pendulum | 240 steps, hard labels | 80.2 %, 4.9° | 96.7 %, 3.7°, 11.3° |
 //! | fuel line | 120 steps | 83.3 %, 2.7° | 95 %, 1.5°, 179° |
 //!
-//! Two Zen 4 cores under a load of twenty, so only processor time is meaningful: 25 s for 120 steps, 6.4 ms per
-//! evaluation in four quarter turns. The fuel line looks almost the same after half a turn, which causes its worst
-//! error. Not measured: 240 steps of the fuel line, the rod end, other input sizes, times on an idle machine.
+//! The measurements ran on two Zen 4 cores with a load average of twenty, so only processor time is meaningful: 25 s
+//! for 120 steps, 6.4 ms per evaluation in four quarter turns. The fuel line looks almost the same after half a turn,
+//! which causes its worst error. Not measured: 240 steps of the fuel line, the rod end, other input sizes, times on an
+//! idle machine.
 
 mod augmented;
 mod config;
