@@ -40,12 +40,12 @@ fn main() -> Result<()> {
         eprintln!("{} parts: {alarms} of {all}", (chunk + 1) * PARTS_AT_ONCE as u64);
     }
     for (condition, [alarms, all]) in CONDITIONS.iter().zip(counts) {
-        println!("{condition:?}: {alarms} of {all} pictures without the part with a false alarm");
+        println!("{condition:?}: {alarms} of {all} pictures without the part have a false alarm");
     }
     Ok(())
 }
 
-/// Pictures with any accepted detection, by condition.
+/// The number of pictures with an accepted detection, for each condition.
 fn false_alarms(part: &FitPart, a_condition: usize) -> Result<Vec<u64>> {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;

@@ -1,4 +1,5 @@
-//! Refits the constants of the verification on generated parts, and prints the differences. Changes no file.
+//! Refits the constants of the verification on generated parts, and prints the fitted values beside the present ones.
+//! Changes no file.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_constants -- [--parts N] [--rounds N] [--size WxH[,WxH]] [--seed S]
 //! [--only NAME[,NAME]]`; `--only score` fits the weights of the score alone, which takes minutes instead of hours.

@@ -1,12 +1,12 @@
-//! Fits the standard errors of a grasp in the plan view on generated parts, and prints the differences. Changes no
-//! file.
+//! Fits the constants of the standard errors of a grasp in the plan view on generated parts, and prints them beside the
+//! shipped constants. Changes no file.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`
 //!
 //! Generates PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of
 //! its photo's camera, and searches for it in one picture of each of the generator's conditions with the part. Half of
-//! the parts have pictures of 640x480, the others of 320x240. The constants minimise the pinball loss at 68 % of the
-//! logarithm of the errors, with equal weight to each condition.
+//! the parts have pictures of 640x480, the others of 320x240. The constants minimise the pinball loss of the logarithm
+//! of the errors at the 68 % quantile, with equal weight for each condition.
 
 use std::ops::ControlFlow;
 
@@ -204,8 +204,8 @@ fn fit(measured: &[Measured], start: &ErrorLength) -> ErrorLength {
         loop {
             let tried =
                 (0..4).flat_map(|which| [1.0 + step, 1.0 / (1.0 + step)].map(|factor| moved(&best.1, which, factor)));
-            // Also changes pairs of constants in opposite directions, because noise and its growth compensate each
-            // other.
+            // Also changes pairs of constants in opposite directions, because an increase of one constant of such a
+            // pair can compensate a decrease of the other.
             let traded = [(0, 1), (0, 3), (2, 3)].into_iter().flat_map(|(one, other)| {
                 [1.0 + step, 1.0 / (1.0 + step)].map(|factor| moved(&moved(&best.1, one, factor), other, 1.0 / factor))
             });

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! metadata   format          "sdg base weights 1"
-//!            preset          the preset to which they belong
+//!            preset          the preset to which the weights belong
 //!            reinitialized   names of the parameters that teaching initialises randomly   (JSON)
-//!            further information about their creation: commit, seed, steps, parts, licence
+//!            further information about the creation of the weights: commit, seed, steps, parts, licence
 //! tensors    NAME            f16: the detector's parameters
 //!            imprint.*       f16: the weights that compute the detector's last layers from a part's views
 //!            orientation.*, orientation_imprint.*   f16: the same for the orientation CNN

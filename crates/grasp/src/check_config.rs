@@ -99,11 +99,13 @@ pub struct Term {
 
 /// The weights of the evidence; see [`crate::Contributions`] for the terms.
 ///
-/// Fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of the likeness:
-/// `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges,
-/// hue, size and bias were set by hand; with these ranges only details, table, added and mirror can each reject a pose
-/// regardless of the other terms. The network's weight was fitted on models C of ten generated parts: only a missing
-/// proposal counts, because a network also proposes look-alikes.
+/// Most terms were fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of
+/// the likeness: `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score`
+/// (docs/decisions/007-score.md). The terms from `details` to `mirror` come from nine tuned sets of datasets/split.toml
+/// and 16 rendered parts (docs/decisions/025-acceptance.md, 026-details.md). Ranges, hue, size and bias were set by
+/// hand; with these ranges only details, table, added and mirror can each reject a pose regardless of the other terms.
+/// The network's weight was fitted on models C of ten generated parts: only a missing proposal counts, because a
+/// network also proposes look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {
@@ -128,8 +130,7 @@ pub struct ScoreConfig {
     pub resemblance: Term,
     /// Term of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
-    /// Term of [`sdg_shape::CloseLook::details`] where the value speaks against a pose. Fitted on the tuned side of a
-    /// split (docs/decisions/026-details.md), like `details_for`.
+    /// Term of [`sdg_shape::CloseLook::details`] where the value speaks against a pose.
     pub details: Term,
     /// Term of [`sdg_shape::CloseLook::details`] where the value supports a pose. Values between the ranges of
     /// `details` and `details_for` are neutral.
@@ -142,7 +143,8 @@ pub struct ScoreConfig {
     pub added: Term,
     /// Term of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Term of the log-likelihood ratio of the network's score, on the part over elsewhere.
+    /// Term of the network's log-likelihood ratio: ln of the likelihood of the network's output on the part over its
+    /// likelihood elsewhere.
     pub network: Term,
 }
 
@@ -150,8 +152,7 @@ impl ScoreConfig {
     /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
-    /// The weights for pictures with known lengths, where another size outweighs all but the
-    /// strongest other evidence.
+    /// The weights for pictures with known lengths, where another size outweighs all but the strongest other evidence.
     pub(crate) fn of_known_size(self) -> Self {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }

@@ -18,7 +18,7 @@ pub(crate) fn outline() -> Polygon {
     Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() }
 }
 
-/// The parts with smooth edges.
+/// A picture of the part at each of the poses `parts`, with antialiased edges.
 pub(crate) fn picture([width, height]: [u32; 2], parts: &[PlanarSimilarity]) -> RgbImage {
     let outline = outline();
     let inverses: Vec<PlanarSimilarity> = parts.iter().map(PlanarSimilarity::inverse).collect();

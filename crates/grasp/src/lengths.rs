@@ -40,7 +40,7 @@ impl Lengths {
             return Ok(());
         }
         Err(GraspError::Damaged {
-            expected: format!("1 to {MAX_PIXELS_PER_M} pixels a metre and heights of 0 to {MAX_HEIGHT_M} m"),
+            expected: format!("1 to {MAX_PIXELS_PER_M} pixels per metre and heights of 0 to {MAX_HEIGHT_M} m"),
             found: format!("{self:?}"),
         })
     }

@@ -3,7 +3,8 @@
 //! A higher point appears shifted away from the point vertically below the camera, by a fraction of its distance from
 //! that point. For a camera that points vertically down, the point below it is the centre of the picture:
 //! ```text
-//! shift = η · (position − centre, in the picture) − the same in the photo        η = height / (distance − height)
+//! shift = η · ((position − centre) in the picture − (position − centre) in the photo)
+//!     η = height / (distance − height)
 //! ```
 //! η is unknown. The marks' surroundings, as edges and colours, are compared with the picture at the shifts of all
 //! possible η, which form a line. Since no camera points exactly down, shifts beside this line are also compared. A
@@ -22,7 +23,7 @@ use crate::taught_marks::TaughtMarks;
 /// Radius of the surroundings about the centre of the grasp line, in lengths of the line: points farther away are at
 /// another height. With 0.8 lengths the edges of 11 of 32 flanges determine the shift, with 0.6 those of 30.
 const SURROUNDINGS: f64 = 0.6;
-/// Minimum length of the line for the surroundings, as a fraction of the diagonal.
+/// Minimum length of the line in the calculation of this radius, as a fraction of the diagonal.
 const MIN_LINE_SHARE: f64 = 0.2;
 /// Smallest and largest η: a mark 40 mm high under a camera 300 mm above the table has 0.15. Chosen from that.
 const HEIGHT_SHARES: (f64, f64) = (-0.04, 0.18);
@@ -33,7 +34,8 @@ const STEP: f64 = 0.01;
 /// Last step of the search, in diagonals. Chosen to save time.
 const LAST_STEP: f64 = 0.0025;
 /// Penalty per diagonal of shift along the line, in agreement of edges and surface together, in `[0, 2]`. Fitted like
-/// the next two (see above); half or double these values change the number of parts within 4 %, 304, by at most 3.
+/// the next two (see above). With half or twice these values, the number of parts within 4 % (304) changes by at most
+/// 3.
 const COST_ALONG: f64 = 3.0;
 /// Penalty per diagonal of shift across the line.
 const COST_ACROSS: f64 = 5.0;
@@ -136,7 +138,8 @@ impl MarksShift {
     }
 }
 
-/// A part of a picture in which a raised centre is at the outline's position.
+/// A piece of a picture in which the raised surroundings of the marks are moved to the position that they would have in
+/// the outline's plane.
 pub(crate) struct Straightened {
     pub(crate) image: RgbImage,
     /// The upper left corner in the picture.
@@ -148,8 +151,8 @@ impl MarksShift {
     /// pose. The flanks of the raised area are moved by a shift that decreases from its top to its foot.
     ///
     /// # Units and frames
-    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that its pyramid has the picture's
-    /// pixels.
+    /// Pixels of the picture; the corner lies at multiples of `coarsest_pixel`, so that the pyramid of the result has
+    /// the same pixels as the picture's pyramid.
     pub(crate) fn straightened(
         &self,
         image: &RgbImage,

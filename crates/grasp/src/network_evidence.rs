@@ -53,7 +53,8 @@ impl NetworkEvidence {
         }
     }
 
-    /// Log-likelihood ratio of the score's class, on the part over elsewhere. Every count is increased by one.
+    /// ln of the likelihood of the score's class on the part over its likelihood elsewhere. Every count is increased by
+    /// one.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);

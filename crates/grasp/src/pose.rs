@@ -8,8 +8,8 @@ use crate::GraspError;
 /// The heights of the marks and of the grasp, which a photo does not show: known from the part, or measured once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraspPlane {
-    /// Height of the marks' plane in the base frame, in metres. The original uses the table's height and therefore has
-    /// a parallax error: 11 mm for marks 40 mm high, 150 px off the axis.
+    /// Height of the marks' plane in the base frame, in metres. The paper's code uses the table's height and therefore
+    /// has a parallax error: 11 mm for marks 40 mm high, 150 px off the axis.
     pub mark_height_m: f64,
     /// Height of the gripper's centre point when it closes, in the base frame, in metres.
     pub grasp_height_m: f64,
@@ -35,7 +35,7 @@ impl GraspPose {
     /// A ray that misses the plane, or a part wider than the gripper's opening.
     ///
     /// # Source
-    /// Paper, section V-A (perception node); the original scales pixels by camera height / focal length instead.
+    /// Paper, section V-A (perception node); the paper's code scales pixels by camera height / focal length instead.
     pub fn from_planar(
         camera: &PosedCamera,
         grasp: &PlanarGrasp,

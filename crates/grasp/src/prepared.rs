@@ -121,7 +121,7 @@ impl PreparedSizes {
         range: &SizeRange,
         config: &SearchConfig,
     ) -> Result<Arc<Prepared>> {
-        // The pose of the resized cut-out in the halved picture.
+        // The scale of the resized cut-out in the halved picture.
         let over_working = |scale: &f64| scale / working.shrink() / working.cutout_scale;
         let scales = over_working(range.scales.start())..=over_working(range.scales.end());
         let key = PreparedKey { cutout_scale: working.cutout_scale, scales };

@@ -18,8 +18,8 @@ const SIZE: [u32; 2] = [480, 360];
 const MAX_APART_PX: f64 = 0.3;
 /// Maximum difference in angle, for the same reason.
 const MAX_TURN_RAD: f64 = 0.01;
-/// Maximum difference of scores: the region determines the table's colours, and the best detection in it the reference
-/// size.
+/// Maximum difference of scores: the region determines the table's colours, and the best detection in the region
+/// determines the reference size.
 const MAX_SCORES_APART: f64 = 0.05;
 
 fn picture() -> RgbImage {

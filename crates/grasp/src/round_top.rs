@@ -22,7 +22,7 @@ pub(crate) struct RoundTop {
 }
 
 impl RoundTop {
-    /// `marks` are in pixels of the photo that shows the axis.
+    /// `marks` are in pixels of the cut-out in which `revolution` was found.
     pub(crate) fn new(revolution: &Revolution, marks: &TaughtMarks) -> Self {
         let rise = revolution.radius_beside(&marks.grasp);
         Self { rise, photo_middle: marks.photo_middle.map_or(marks.grasp.center(), Point2::from) }
@@ -38,7 +38,8 @@ impl RoundTop {
         nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera)
     }
 
-    /// `image_from_cutout`, on which all edges agree, shifted to the position of the marks in the picture.
+    /// `image_from_cutout`, the pose at which all edges together agree best, shifted to the position of the marks in
+    /// the picture.
     ///
     /// # Units and frames
     /// As for [`RoundTop::shift`]; `field` belongs to the picture.

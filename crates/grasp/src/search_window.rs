@@ -18,8 +18,8 @@ use crate::taught::TaughtDemonstration;
 use crate::verification::Shot;
 use sdg_shape::PixelRect;
 
-/// Margin of the window around the region, in lengths of the part: the maximum extent beyond the region of a part of
-/// constant width with half of its area inside.
+/// Margin of the window around the region, in lengths of the part. A part of constant width with half of its area in
+/// the region extends no farther beyond the region.
 const MARGIN: f64 = 0.5;
 /// Additional margin in pixels, for the smoothing of the gradients. Chosen by hand.
 const BORDER_PX: f64 = 4.0;

@@ -17,7 +17,7 @@ pub(crate) struct SizeRange {
     nominal: Vec<f64>,
 }
 
-/// Hypotheses within this ratio are one. Chosen by hand, not measured.
+/// Hypotheses whose ln differ by less count as one. Chosen by hand, not measured.
 const SAME_LOG: f64 = 0.03;
 /// Overlapping ranges are searched together if the largest size is at most this many times the smallest, because one
 /// template has its edges at one resolution. Drillscrews taught at three quarters of the pixels were found in one of

@@ -33,14 +33,14 @@ const MIN_EXPLAINED: f64 = 0.1;
 /// For places seen by a camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned
 /// sets).
 const SLANT_GAIN: f64 = 0.03;
-/// Number of places that can determine a slant, which has three coordinates, and the lens, one more: each place
-/// measures two.
+/// Number of places that can determine the tilt, its direction and the lens, three unknowns: each place gives two
+/// equations.
 const SURE_PLACES: usize = 3;
 /// Focal lengths relative to the usual one that are also tried if they explain the places: fields of view of 70°, as in
 /// most telephones, and of 25°.
 const OTHER_LENSES: [f64; 2] = [0.65, 2.0];
-/// Maximum cost of a slant as a fraction of the level camera's for which it is certain. With three or more places it is
-/// 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
+/// A slant is certain if its cost is at most this fraction of the level camera's cost. With three or more places the
+/// fraction is 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
 const UNEXPLAINED: f64 = 0.12;
 /// Minimum score in the rectified picture if nothing is accepted in the picture itself: a slant can also make another
 /// part, mainly a longer one, similar to the photo. Without this minimum, 7 instead of 3 of the tuned sets' 58 pictures
@@ -123,7 +123,7 @@ pub(crate) fn suggested_slant(
         gains.collect()
     };
     let best_gain = |gains: &[f64]| gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // A place that lost agreement may be another thing.
+    // A place that lost agreement may show another object.
     let worth = |gains: &[f64]| match is_sure {
         true => gains.iter().map(|gain| gain.max(0.0)).sum(),
         false => best_gain(gains),
@@ -145,7 +145,8 @@ fn num_parts(places: &[Shortened]) -> usize {
     places.iter().enumerate().filter(is_first).count()
 }
 
-/// The slant with the least cost, at most `most`, and the likeliest one towards the other side, with their costs.
+/// The slant with the least cost, and the likeliest slant towards the opposite side, each with its cost; empty if the
+/// least cost exceeds `most` or the tilt is too small.
 fn likely_slants(focal_px: f64, shortened: &[Shortened], most: f64) -> Vec<(f64, Slant)> {
     let costs: Vec<(f64, Slant)> =
         slants(focal_px).filter_map(|slant| Some((cost(&slant, shortened)?, slant))).collect();
@@ -160,8 +161,8 @@ fn likely_slants(focal_px: f64, shortened: &[Shortened], most: f64) -> Vec<(f64,
     std::iter::once(likeliest).chain(opposite).collect()
 }
 
-/// The gain of agreement that the best of enough places needs for a slant. None is required if they determine the slant
-/// with certainty, since the best places are the least shortened ones.
+/// The minimum gain of agreement of the best place for a slant, if there are enough places. No gain is required if the
+/// places determine the slant with certainty, since the places of the best agreement are the least shortened ones.
 fn required_gain(level_cost: f64, least_cost: f64) -> f64 {
     if least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
 }
@@ -375,7 +376,8 @@ mod tests {
         teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model
     }
 
-    /// Whether a detection is accepted within `tolerance` pixels and degrees of the plate moved and rotated on the table.
+    /// Whether a detection is accepted within `tolerance` pixels and degrees of the plate moved and rotated on the
+    /// table.
     #[cfg(feature = "teach")]
     fn is_plate(detection: &GraspDetection, slant: &Slant, plate: &Isometry2<f64>, tolerance: f64) -> bool {
         let seen = |u: f64| {

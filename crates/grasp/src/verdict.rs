@@ -141,7 +141,8 @@ pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// Log-likelihood ratio of the network's score, on the part over elsewhere; `None` without a network.
+    /// ln of the likelihood of the network's output on the part over its likelihood elsewhere; `None` without a
+    /// network.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,

@@ -103,7 +103,7 @@ impl AngleClasses {
     /// mean.
     pub fn read(&self, probabilities: &[f64], window: usize) -> AngleReading {
         let k = self.num_classes;
-        assert_eq!(probabilities.len(), k, "one probability a class");
+        assert_eq!(probabilities.len(), k, "one probability per class");
         let at = |class: usize, offset: isize| probabilities[(class as isize + offset).rem_euclid(k as isize) as usize];
         let reach = window.min((k - 1) / 2) as isize;
         let smooth = reach / 2;

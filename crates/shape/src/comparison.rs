@@ -196,7 +196,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// As [`Self::evidence`] without the close look, which takes nine tenths of the time; and [`Agreement::both`].
+    /// Returns the result of [`Self::evidence`] without the close look, which takes nine tenths of the time, and
+    /// [`Agreement::both`].
     pub fn evidence_from_afar(&self, image_from_demonstration: &PlanarSimilarity) -> (Evidence, f64) {
         let agreement = self.agreement(image_from_demonstration);
         let surface = agreement.surface;

@@ -34,8 +34,9 @@
 //! | likeness | log-odds of a small network that photo and picture show the same part |
 //! | details | log-odds of a second network, trained on parts and their look-alikes |
 //!
-//! This crate plans no grasp; only [`PlanViewMap`] uses a camera. Parts lie flat: poses are rotations, shifts and scales in
-//! the image plane. The crate uses threads only with the feature `parallel`, and results do not depend on them.
+//! This crate plans no grasp; only [`PlanViewMap`] uses a camera. Parts lie flat: poses are rotations, shifts and
+//! scales in the image plane. The crate uses threads only with the feature `parallel`, and results do not depend on
+//! them.
 //!
 //! # Example
 //!

@@ -2,7 +2,8 @@
 //!
 //! Other interpolation loops, each with its reason beside it: [`GradientField`](crate::GradientField) (directions,
 //! three floats), `sdg-demonstration`'s raster (repeats the border), `sdg-orientation`'s crop (a fixed colour beyond
-//! the border; the weights depend on its exact bits), `sdg-detection`'s pasted masks (single numbers).
+//! the border; trained weights depend on the exact bits of its results), `sdg-detection`'s pasted masks (single
+//! numbers).
 
 use image::RgbImage;
 use wide::{f32x4, i32x4};

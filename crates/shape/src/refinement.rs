@@ -156,8 +156,8 @@ fn follow_in(levels: &[TemplateLevel], field: &GradientField, range: &CaptureRan
     })
 }
 
-/// The scores of the last poses of a climb: after a step, the pose before it is a neighbour, and at a limit all further
-/// steps end at the same pose.
+/// The scores of the last poses of a climb, which are often needed again: after a step, the pose before it is a
+/// neighbour, and at a limit all further steps end at the same pose.
 #[derive(Default)]
 struct LastScores {
     kept: [Option<(Pose, f64)>; 8],

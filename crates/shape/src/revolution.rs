@@ -8,7 +8,7 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Mask, Polygon};
 
 /// Minimum share of the part covered by its mirror image. Seven rendered parts of revolution and a photographed screw
-/// have at least 0.92; the lowest has a deep thread with one start, whose sides differ.
+/// have at least 0.92; the part with the lowest share has a deep thread with one start, whose sides differ.
 const MIN_SYMMETRY: f64 = 0.85;
 /// Minimum length over mean width; the parts measured for [`MIN_SYMMETRY`] have at least 3.4.
 const MIN_SLENDERNESS: f64 = 2.5;

@@ -138,7 +138,7 @@ fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Opti
         let is_highest = (squares[k] >= squares[k - 1]) & (squares[k] > squares[k + 1]);
         is_crest[k] = if is_highest & (trusts[k] >= MIN_TRUST) { 1 << k } else { 0 };
     }
-    // Not the last sample, and none of the unused places.
+    // The last sample and the unused places do not count as crests.
     let mut left = is_crest.into_iter().fold(0, |bits, bit| bits | bit) & ((1 << (len - 1)) - 1);
     let mut crests = [(0.0f32, 0.0f32); MAX_CRESTS];
     let mut count = 0;

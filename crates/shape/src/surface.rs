@@ -344,8 +344,8 @@ impl WithSimd for Correlate<'_> {
         let (sin, cos) = angle.radians().sin_cos();
         let [a, b, tx, ty] = [scale * cos, scale * sin, tx, ty].map(|value| value as f32);
         let of_cell = |cell: &Cell| {
-            // Relative to a colour near all others, because sums of squares of large numbers would lose small
-            // differences.
+            // The sums are of colours relative to one of them, because sums of squares of large numbers would lose
+            // small differences.
             let (mut base, mut count) = (None, 0.0f32);
             let [mut taught, mut seen, mut taught_squares, mut seen_squares, mut products] = [f32x4::ZERO; 5];
             for group in &cell.groups {

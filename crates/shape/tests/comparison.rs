@@ -101,7 +101,8 @@ fn scales_stay_in_range() {
     assert!((0.55..=0.6).contains(&narrow.scale) && (refined.scale - 0.5).abs() < 0.02, "{narrow:?} {refined:?}");
 }
 
-/// A light plate with a dark bar and a hole, moved right by `shift`, on a blue table; `bar` and `hole` by their x.
+/// A light plate with a dark bar and a hole, moved right by `shift`, on a blue table. `bar` is the x of the bar's left
+/// edge, `hole` that of the hole's centre.
 fn plate(shift: f64, bar: f64, hole: f64, length: f64) -> RgbImage {
     RgbImage::from_fn(320, 240, |x, y| {
         let (x, y) = (f64::from(x) - shift, f64::from(y));

@@ -23,7 +23,7 @@ pub struct FeatureMatch {
     pub train_idx: usize,
     /// Euclidean distance of the two descriptors, from 0 to √2.
     pub distance: f32,
-    /// `distance` divided by the distance to the second nearest descriptor; 0 for identical descriptors.
+    /// `distance` divided by the distance to the second nearest descriptor; 1 if both distances are 0.
     pub ratio: f32,
 }
 

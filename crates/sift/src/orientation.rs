@@ -12,7 +12,7 @@ const NUM_BINS: usize = 36;
 const WINDOW_SIGMA: f64 = 1.5;
 /// Radius of the window, in units of its σ.
 const WINDOW_RADIUS: f64 = 3.0;
-/// Minimum height of a peak with a direction of its own, as a fraction of the highest peak.
+/// Minimum height of a peak that gives a direction, as a fraction of the highest peak.
 const PEAK_RATIO: f32 = 0.8;
 
 /// A keypoint in its octave: position and σ in pixels of the octave, and the level nearest to its scale.
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_peak_lies_between_its_bins() {
         let mut histogram = [0.0; NUM_BINS];
-        // A peak between bins 0 and 1, and a lower peak at bin 18 that is high enough, at 20 one that is not.
+        // A peak between bins 0 and 1, a lower peak at bin 18 that is high enough, and one at bin 20 that is not.
         (histogram[35], histogram[0], histogram[1]) = (0.4375, 0.9375, 0.4375 + 0.5 * 0.9375 - 0.03125);
         histogram[18] = 0.8;
         histogram[20] = 0.7;

@@ -93,7 +93,7 @@ pub struct SimilarityFit {
 /// Similar keypoints: one in the template, one in the image.
 pub type KeypointPair = (SiftKeypoint, SiftKeypoint);
 
-/// Finds the similarity; `None` if no more matches agree than by chance.
+/// Finds the similarity; `None` if no more matches agree than are expected by chance.
 ///
 /// `search_area` is the area that contains the image's keypoints, in square pixels.
 ///

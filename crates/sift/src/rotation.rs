@@ -90,7 +90,7 @@ pub enum RotationMethod {
 }
 
 impl RotationEstimate {
-    /// Whether another rotation has an overlap of the outlines lower by less than 0.03; never true for matched
+    /// Whether the overlap of the outlines at another rotation is lower by less than 0.03; never true for matched
     /// keypoints.
     pub fn is_ambiguous(&self) -> bool {
         match self.method {

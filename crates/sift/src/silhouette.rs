@@ -149,7 +149,7 @@ impl Silhouette {
             pairs.truncate((TRIM * pairs.len() as f64).ceil() as usize);
             let Some(step) = normal_step(&pairs, &pose.apply(&self.centroid)) else { return pose };
             let next = step.compose(&pose);
-            // The movement of the outline's far end, about one radius from the centre, in one more step.
+            // The iteration has converged if this step hardly moves the centre and the far end, about one radius away.
             let radius = self.area.sqrt() * next.scale;
             let moved = next.apply(&self.centroid) - pose.apply(&self.centroid);
             let converged = moved.norm() < 0.01 && next.angle.distance(pose.angle) * radius < 0.01;
@@ -168,7 +168,7 @@ impl Silhouette {
 }
 
 /// The small similarity about `center` that brings the points closest to the lines through their partners, by least
-/// squares. `None` if the lines do not determine it, as for a circle.
+/// squares. `None` if it would be very large.
 fn normal_step(pairs: &[(Point2<f64>, OutlinePoint)], center: &Point2<f64>) -> Option<PlanarSimilarity> {
     let (mut normal_matrix, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let radius = pairs.iter().map(|(from, _)| (from - center).norm()).fold(1.0, f64::max);

@@ -68,7 +68,7 @@ fn outlines_tell_the_turn_where_texture_is_missing() {
     let estimator = estimator();
     for part in PARTS {
         let outline = outline(part);
-        // The part in one flat tone, barely darker than a flat table.
+        // The part in one flat tone, barely brighter than a flat table.
         let flat = |outline: &Polygon| {
             let mask = outline.rasterize(640, 480);
             (Plane::from_fn(640, 480, |x, y| if mask.get(x, y) { 0.505 } else { 0.5 }), mask)

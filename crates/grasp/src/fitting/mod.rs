@@ -13,9 +13,9 @@
 //! **Loss** ([`Loss`]). A picture's detections are scored as in detection. Let p be the best score of a correct pose of
 //! an instance and q the best score of a wrong pose in a picture, each 0 if there is none; both are clamped to 0.01 and
 //! 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss
-//! of several parts is their mean. The minimum is 0.02. A correct pose lies within 4 % of the part's diagonal and 10° of
-//! an instance, up to its symmetry. Poses on a part that differs only in size count as neither correct nor wrong:
-//! without a camera, that part is the same part.
+//! of several parts is their mean. The minimum is 0.02. A correct pose lies within 4 % of the part's diagonal and 10°
+//! of an instance, up to its symmetry. Poses on a part that differs only in size count as neither correct nor wrong:
+//! without a calibrated camera, that part looks like the taught one at another distance.
 //!
 //! **Intervals.** Parts are independent, pictures of one part are not. A difference between two values is therefore
 //! computed per part; its interval is the mean ± 1.96 standard errors of those differences.

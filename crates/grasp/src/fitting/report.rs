@@ -85,7 +85,8 @@ impl fmt::Display for FitReport {
         }
         writeln!(
             f,
-            "\n{}\nEach constant alone, the others as today, the score's weights fitted again for every value, today's included.",
+            "\n{}\nEach constant is fitted alone, with the others as today; the score's weights are fitted again for \
+             every value, also for today's.",
             self.score
         )?;
         writeln!(f, "Loss, right accepted and false alarms on the held-out half.\n")?;

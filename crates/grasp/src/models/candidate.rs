@@ -37,7 +37,7 @@ pub(crate) struct PoseCandidate {
     /// The keypoints, each with the network's score; empty for a model without keypoints.
     pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
     pub(crate) grasp: PlanarGrasp,
-    /// The demonstration that is compared first.
+    /// The demonstration to which the pose belongs.
     pub(crate) demonstration_idx: usize,
     /// The pose of the demonstration's cut-out in the image.
     pub(crate) image_from_cutout: PlanarSimilarity,

@@ -148,7 +148,8 @@ fn turned(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> Plana
     pose.compose(&PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0))
 }
 
-/// The model's pose; the pose fitted into the box if it differs; the pose fitted into the box rotated by 180°.
+/// The model's pose; the pose fitted into the box in the same direction, if it differs; the pose fitted into the box in
+/// the opposite direction.
 fn likely_poses(demonstration: &TaughtDemonstration, read: &PoseCandidate) -> Vec<PlanarSimilarity> {
     /// Maximum distance of a point between two poses that count as one, as a fraction of the box's diagonal.
     const MAX_DISTANCE: f64 = 0.01;

@@ -17,8 +17,8 @@ const WEIGHT: f64 = 3.0;
 
 /// Weight of the comparison network's log-odds relative to the log-odds of the class. Of the same 40 pictures, the
 /// number that scored above every picture without the part was: 22 with a weight of 0, 24 with 0.5 and 1, 27 with 2, 29
-/// with 3. The number of correct poses was 35, and 34 with 2 and 3. The network's output varies more between parts than
-/// these four show.
+/// with 3. The number of correct poses was 35 with weights of 0, 0.5 and 1, and 34 with 2 and 3. The network's output
+/// varies more between parts than these four show.
 const COMPARISON_WEIGHT: f64 = 2.0;
 
 /// Weight of the similarity of the part's features in the finer views. Measured on 49 pictures with correct poses of

@@ -107,8 +107,8 @@ impl PlanViewDetector {
     }
 
     /// Searches the plan view for parts of these sizes relative to the part's size, because a higher part appears
-    /// larger. No size within the range then speaks against a part. With `None`, parts lie on the table, and another
-    /// size is another part.
+    /// larger. No size within the range then speaks against a part. With `None`, parts lie on the table, and a
+    /// different size means another part.
     ///
     /// # Errors
     /// An invalid range, as for [`GraspModel::with_size_tolerance`].

@@ -8,7 +8,7 @@ use crate::region::{RegionError, SearchRegion};
 use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
 
-/// Number of intervals between mapped points on each edge of the region, because a lens bends the edge.
+/// Each edge of the region is mapped at points that divide it into this many intervals, because a lens bends the edge.
 const POINTS_A_SIDE: u32 = 16;
 
 /// A region of the picture, and its bounding box in the plan view.

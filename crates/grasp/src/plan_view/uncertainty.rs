@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Errors that a grasp does not exceed with a probability of 68 %, that is, of one standard deviation.
+/// Errors of one standard deviation: the error of a grasp is smaller with a probability of 68 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
     /// Radius around the position in the plane, in metres.

@@ -1,5 +1,5 @@
-//! Compares the models with a network on every device of the build with flex: stage by stage, end to end, and in
-//! teaching.
+//! Compares every other device of the build with flex, for the models with a network: stage by stage, end to end, and
+//! in teaching.
 //!
 //! Requires the features of the devices: `make test-wgpu`, `make test-ndarray`.
 

@@ -23,9 +23,9 @@ pub struct FineTuning {
 }
 
 impl FineTuning {
-    /// Settings with which teaching takes half a minute on two cores, with two dozen other parts. Most parts are good
-    /// enough after 40 steps; in about six of 30 held-out samples with the part, it is so covered or blurred that no
-    /// network finds it.
+    /// Settings with which teaching takes half a minute on two cores, with two dozen other parts. For most parts the
+    /// network is good enough after 40 steps; in about six of 30 held-out samples with the part, it is so covered or
+    /// blurred that no network finds it.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {

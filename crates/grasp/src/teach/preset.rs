@@ -76,7 +76,7 @@ impl Preset {
         }
     }
 
-    /// The training samples: except for `paper` at the network's input size, so that no computation is wasted.
+    /// The training samples. Except for `paper`, they have the network's input size, so that no computation is wasted.
     pub(super) fn samples(self) -> AugmentationConfig {
         match self {
             Self::Edge => AugmentationConfig::default().with_output_size(320, 240),

@@ -61,7 +61,7 @@ fn whole_teaching(options: &TeachOptions) -> NetworkTeaching {
     NetworkTeaching::new(options).unwrap()
 }
 
-/// A preset's settings, reduced for a test; it accepts any network.
+/// A preset's settings, reduced for a test, with which any network is good enough.
 pub(super) fn small_teaching(options: &TeachOptions) -> NetworkTeaching {
     let mut teaching = whole_teaching(options);
     shrink(&mut teaching.detector.network);

@@ -18,7 +18,7 @@ const MIN_TURN_DEG: f64 = 45.0;
 pub struct TurnedGrasp {
     /// Number of the photo; the first photo has the number 1.
     pub photo: usize,
-    /// The smallest rotation between the two directions that the part's symmetry leaves, in degrees.
+    /// The smallest rotation between the two directions, up to the part's symmetry, in degrees.
     pub turn_deg: f64,
 }
 

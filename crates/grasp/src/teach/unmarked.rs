@@ -1,4 +1,4 @@
-//! Removes parts that are not marked from the photos of a demonstration.
+//! Removes unmarked parts from the photos of demonstrations.
 //!
 //! The photos are the background of the samples: an unmarked part there would be taught as background, raise the
 //! resemblance of other objects, and count as a wrong detection.
@@ -12,7 +12,8 @@ use crate::model::{GraspModel, Verification};
 
 /// The demonstrations without the unmarked parts that the model detects in their photos, and the number of these parts.
 ///
-/// Only samples are made from the returned photos: their other objects may be damaged where a detection is wrong.
+/// The returned photos are used only to make samples, because their other objects may be damaged where a detection is
+/// wrong.
 ///
 /// # Errors
 /// As for [`GraspModel::detect`].

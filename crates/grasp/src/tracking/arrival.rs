@@ -61,7 +61,7 @@ pub(super) enum Match {
     Confirms,
     /// The same part at another pose of better agreement.
     Corrects,
-    /// The same part, elsewhere or rotated by its symmetry, without better agreement.
+    /// The same part at another pose that does not agree better, or that differs only by the part's symmetry.
     Disagrees,
 }
 

@@ -1,7 +1,7 @@
 //! Parts followed through a sequence of pictures.
 //!
 //! ```text
-//! frame n ─┬─ each track: pose carried forward by its velocity ─ window around it  edges ─ score ─ followed or lost
+//! frame n ─┬─ each track: pose carried forward by its velocity ─ window around it ─ edges ─ score ─ followed or lost
 //!          │                                                                                          ↑
 //!          ├─ now and then: PartSearch, on another core ─ detections in frame n ─ carried forward ────┤
 //!          │                                              through the frames since, or matched to tracks

@@ -30,10 +30,10 @@ const MAX_FORWARD_SECS: f64 = 0.1;
 /// If the agreement is below this fraction of its running mean, refinement is repeated with more effort. Chosen by
 /// hand.
 const POOR_SHARE: f64 = 0.85;
-/// Maximum difference between a search's pose and the pose by edges that is a correction; larger differences indicate
+/// Maximum difference between a search's pose and the pose by edges for a correction; larger differences indicate
 /// another place. In pixels of the cut-out; chosen by hand.
 const MAX_CORRECTION_PX: f64 = 3.0;
-/// Maximum difference in rotation that is a correction, in radians. Chosen by hand.
+/// Maximum difference in rotation for a correction, in radians. Chosen by hand.
 const MAX_CORRECTION_RAD: f64 = 0.06;
 /// Minimum gain of agreement for a search's pose to replace the followed one. Chosen by hand.
 const MIN_GAIN: f64 = 0.005;
@@ -70,7 +70,7 @@ pub(super) enum Standing {
         replaces: Option<u64>,
     },
     Followed,
-    /// The part is lost since this time.
+    /// The part has been lost since this time.
     Lost(Duration),
 }
 

@@ -68,7 +68,7 @@ impl Details {
         cells.into_iter().enumerate().filter_map(differs).collect()
     }
 
-    /// Length in pixels of the part's longer side, the smaller of photo and picture.
+    /// Length in pixels of the part's longer side: the smaller of its lengths in photo and picture.
     fn longer_side_px(&self, image_from_cutout: &PlanarSimilarity) -> f64 {
         PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0)
     }

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! ┌────────────────────────┐
-//! │    ┌────────┐          │   a cell, and the window about it: all within `margin` of any
-//! │    │ ┌────┐ │          │   place in the cell can be read in the window
+//! │    ┌────────┐          │   a cell, and the window about it: all points within `margin` of any
+//! │    │ ┌────┐ │          │   point of the cell can be read in the window
 //! │    │ │cell│ │          │
 //! │    │ └────┘ │          │
 //! │    └────────┘          │

@@ -6,9 +6,9 @@
 //!                                           │   (large pictures: a sweep of the next coarser level selects places)
 //!                    sweep: every place × every variant ─ local maxima of every scale: starts
 //!                                           │
-//!          climb the agreement at a coarse level, 64 at a time; climb and snap the best level by level, eight at a time, as
-//!          long as the last eight have found something, and to the finest level where a match is possible; then further
-//!          starts that resemble those
+//!          climb the agreement at a coarse level, 64 at a time; climb and snap the best level by level, eight at a
+//!          time, as long as the last eight have found something, and to the finest level where a match is possible;
+//!          then further starts that resemble the starts of the found parts
 //!                                           │
 //!          edges and surface ─ agreement ─ overlapping ones suppressed ─ poor ones refined again ─ Match, Evidence
 //! ```
@@ -146,8 +146,8 @@ const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Largest gain of agreement from the agreement's level to full resolution. On the tuned sets it is 0.06 at most for 99
 /// of 100 places; a place that would gain more than `MAX_GAIN` is not lost, but placed less exactly.
 const MAX_GAIN: f64 = 0.1;
-/// Two places overlap for certain if they share this much more of the area than matches may: the share is estimated
-/// from few points, and both places still move by pixels. Chosen by hand.
+/// Two places certainly overlap if their common share of the area exceeds [`MAX_OVERLAP`] by this much, because the
+/// share is estimated from few points and both places still move by some pixels. Chosen by hand.
 const OVERLAP_MARGIN: f64 = 0.15;
 /// Largest difference of the ln sizes of the parts in one picture: two steps of scale. Chosen by hand to save time.
 const SAME_SIZE: f64 = 0.2;

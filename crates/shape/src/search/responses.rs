@@ -8,8 +8,8 @@
 //! The part's centre is tried at places that are [`PITCH`] pixels apart. Pixels are therefore kept in one table for
 //! each remainder of x and y, so that neighbouring places read neighbouring bytes.
 //!
-//! Spreading allows a step between places and angles that is wider than an edge, and directions are still read where a
-//! thin part shows both its edges.
+//! Spreading allows a step between places and angles that is wider than an edge. Since the best response counts and
+//! directions are not averaged, both edges of a thin part keep their responses.
 //!
 //! # Source
 //! The idea of spread directions, response maps and their order in memory is LINE-2D's (Hinterstoisser et al.,

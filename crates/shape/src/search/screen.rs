@@ -1,7 +1,7 @@
 //! Selects the places of a large picture that are swept: those near the best places of the next coarser level.
 //!
-//! A sweep of the coarser level takes an eighth of the time or less, because it has a quarter of the places, half of the
-//! angles and fewer scales.
+//! A sweep of the coarser level takes an eighth of the time or less, because it has a quarter of the places, half of
+//! the angles and fewer scales.
 
 use crate::edge_points::EdgePoint;
 use crate::gradient_field::GradientField;
@@ -14,8 +14,8 @@ use crate::search::sweep::{Area, sweep};
 const MIN_PLACES: usize = 1 << 18;
 /// Minimum number of edge points at the coarser level. Chosen by hand.
 const MIN_POINTS: usize = 24;
-/// Number of places of the coarser level about which the picture is swept. With 128 instead, 13 of 130 parts in mosaics of
-/// photographs were lost; with 256 one.
+/// Number of places of the coarser level about which the picture is swept. With 128 places, 13 of 130 parts in mosaics
+/// of photographs were lost; with 256, one.
 const MAX_STARTS: usize = 256;
 /// How far the swept places extend around a place of the coarser level, in swept places: three places of that level.
 /// Chosen by hand.

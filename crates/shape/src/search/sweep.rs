@@ -119,7 +119,7 @@ impl Area {
         self.blocks.iter().filter(|&&is_swept| is_swept).count() as f64 / self.blocks.len() as f64
     }
 
-    /// Whether the block from an offset on belongs to the area; everything does without one.
+    /// Whether the block that begins at an offset belongs to the area; without an area, every block does.
     fn has(area: Option<&Self>, offset: usize) -> bool {
         area.is_none_or(|area| area.blocks[offset / BLOCK])
     }
@@ -148,7 +148,8 @@ struct PeakField {
 }
 
 impl PeakField {
-    /// `sums_from` returns the sums from an offset on, relative to the first place; none in a stretch that is not swept.
+    /// `sums_from` returns the sums from an offset on, relative to the first place; none in a stretch that is not
+    /// swept.
     fn new<'a>(responses: &Responses, sums_from: impl Fn(usize) -> &'a [i16]) -> Self {
         let (width, height) = (responses.width, responses.height);
         let stride = width + 2 * PEAK_RADIUS;
@@ -191,7 +192,7 @@ impl PeakField {
     }
 }
 
-/// The best of each place of a stretch, per group; empty if none of its places is swept.
+/// The best sum at each place of a stretch and its variant, per group; empty if no place of the stretch is swept.
 struct Swept {
     sums: Vec<Vec<i16>>,
     variants: Vec<Vec<u16>>,
