@@ -26,7 +26,7 @@ site: setup web ## Builds the site of all guides into target/site (mdBook from i
 	@scripts/site.sh
 
 # Screenshots stay in target/site-test.
-test-site: site ## Checks the built site: links, anchors, nothing from elsewhere, size, axe-core at 390 px and on a desk
+test-site: site ## Checks the built site: links, anchors, nothing from elsewhere, size, axe-core at widths of 390 and 1280 px
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	$(CARGO) test $(RELEASE) --locked --workspace --test checks -- --ignored site::
@@ -37,13 +37,13 @@ test-guides: setup ## Runs the guides' commands, those that take long too
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
 
-wheel: setup ## Builds the Python package's wheel into target/wheels (maturin from PyPI; MANYLINUX=1: one that runs from glibc 2.31 on, in target/packages/wheel, also with ARCH=arm64; TRY=1: used in Debian 11; root)
+wheel: setup ## Builds the Python package's wheel into target/wheels (maturin from PyPI; MANYLINUX=1: one that runs from glibc 2.31 on, in target/packages/wheel, also with ARCH=arm64; TRY=1, as root: then used in Debian 11)
 	@$(if $(MANYLINUX),ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/wheel.sh,scripts/python/wheel.sh)
 
 test-python: wheel ## Tests the wheel in a clean environment: the same grasps as Rust's, wrong input, the guide (PYTEST="-k equal": some)
 	@scripts/python/test.sh $(PYTEST)
 
-capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's and CMake's files (TRY=1: used in a clean Debian; root)
+capi: setup ## Builds the C library into target/capi: lib, include, pkg-config's and CMake's files (TRY=1, as root: then used in a clean Debian)
 	@scripts/c/install.sh target/capi
 	@$(if $(TRY),scripts/c/try.sh target/capi)
 
@@ -107,10 +107,10 @@ slurm-image: build ## An OCI image of sdg by mmdebstrap and umoci, run without n
 	@scripts/slurm/image.sh
 
 # PROFILE=release takes a quarter of the time, for trials.
-deb: setup ## A Debian package of sdg, in target/packages/deb (ARCH=arm64: for it; TRY=1: installed, used and removed in a clean root; root)
+deb: setup ## A Debian package of sdg, in target/packages/deb (ARCH=arm64: for arm64; TRY=1, as root: then installed, used and removed in a clean Debian)
 	@ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/deb.sh
 
-tarball: setup ## One directory of sdg that runs from glibc 2.31 on, in target/packages/tarball (ARCH=arm64; TRY=1: used in Debian 11; root)
+tarball: setup ## One directory of sdg that runs from glibc 2.31 on, in target/packages/tarball (ARCH=arm64: for arm64; TRY=1, as root: then used in Debian 11)
 	@ARCH="$(ARCH)" TRY="$(TRY)" scripts/packages/tarball.sh
 
 test-arm64: setup ## Unit tests that need no simulator, compiled for arm64, under qemu (burn is compiled once more)
@@ -131,7 +131,7 @@ hardening: setup ## Hostile input for every reader of files and messages from ou
 endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot with wrong perception (SECTION="crash soak", QUICK=1; root)
 	@scripts/hardening/endure.sh $(SECTION)
 
-coverage: setup ## Lines and regions of robot, fci and kinematics that tests reach (FILES=1: the lines that none does)
+coverage: setup ## Lines and regions of robot, fci and kinematics that tests reach (FILES=1: also the lines that no test reaches)
 	@scripts/coverage.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
@@ -164,17 +164,17 @@ test-torch: setup ## Tests a whole network against torchvision, losses and gradi
 	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
 	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(RELEASE) --locked --workspace --test detection -- --ignored golden::
 
-# The libraries for other programs, and their dependencies. Nothing is published, or compiled again, because the tests compile the same code.
+# The libraries for other programs, and their dependencies. Nothing is published; nothing is compiled, because the tests compile the same code.
 PACKAGED = geometry picture kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
 
 package: ## Packages the libraries that other programs can use, into target/package
 	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
 
 # With the features of all crates, so that code that CI does not run is compiled too; then the program for small machines, which has
-# none. CUDA's build downloads LLVM, which a check does not need, unless DOCS_RS is set.
+# no feature. Unless DOCS_RS is set, CUDA's build downloads LLVM, which a check does not need.
 FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu,sdg-python/extension
 
-lint: setup ## Spelling, formatting and lints, with every feature, as CI denies them
+lint: setup ## Spelling, formatting and lints with every feature; warnings are errors, as in CI
 	@scripts/spelling.sh
 	$(CARGO) fmt --all --check
 	DOCS_RS=1 $(CARGO) clippy $(RELEASE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
@@ -207,7 +207,7 @@ bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentation
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 	@$(MAKE) bench-search QUICK=$(findstring --quick,$(BENCH))
 
-# Without a folder of sets, only shipped parts are measured. Of the sets, only those are opened to which constants are or were fitted.
+# Without a folder of sets, only shipped parts are measured. Only the sets to which constants are or were fitted are opened.
 bench-search: setup ## Model S against corrmatch, OpenCV's matchTemplate and LINEMOD, and its curves of time (SETS=FOLDER; QUICK=1: shipped parts, nothing is written)
 	@scripts/build.sh --bin sdg-bench
 	benches/peers/install-matchers.sh target/bench/matchers
@@ -223,7 +223,7 @@ bench-browser: web ## The page's speed against onnxruntime-web in headless Chrom
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
 # Installs PyPI's ompl in target/plan-peers. Takes a quarter of an hour on two cores.
-bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks a second, and OMPL on the same model
+bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks per second, and OMPL on the same model
 	$(CARGO) build $(RELEASE) --locked --workspace --example planning
 	target/release/examples/planning rate
 	target/release/examples/planning proof 1000
