@@ -57,8 +57,8 @@ impl Reach {
         let area_m2 =
             |least: usize| self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2;
         let mut lines = vec![format!(
-            "with the tcp {:.0} mm above the table and the hand straight down, {:.2} m² of it are reached, {:.2} m² \
-             at every angle of the hand",
+            "with the tcp {:.0} mm above the table and the hand straight down, {:.2} m² of the table are reached, \
+             {:.2} m² at every tested angle of the hand",
             self.height_m * 1e3,
             area_m2(1),
             area_m2(NUM_TURNS)

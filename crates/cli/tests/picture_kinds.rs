@@ -11,7 +11,7 @@ use crate::support::{Folder, sdg, shipped, taught_pendulum};
 
 /// Maximum difference between two lossless storage formats.
 const SAME_PX: f64 = 0.5;
-/// Maximum difference if the pixels change: after JPEG, or with fewer bits.
+/// Maximum difference if the pixels change: after JPEG, or after conversion to grey with 10 or 12 bits.
 const JPEG_PX: f64 = 1.0;
 
 fn photo() -> RgbImage {

@@ -7,8 +7,9 @@ const CAMERA_BITS: [u32; 3] = [8, 10, 12];
 /// Maximum value of floats that count as overexposed. By convention, floats are 1 at full brightness; up to this
 /// maximum they are slightly overexposed, and above it they are integers stored as floats.
 const MAX_OVEREXPOSED: f32 = 2.0;
-/// Minimum of the largest alpha value in a picture. If all values are smaller, alpha is unset, a mask of 0 and 1, or
-/// fractions truncated to integers; compositing with these values would give a white picture.
+/// Alpha is used only if at least one alpha value in the picture reaches this limit. If all values are smaller, alpha
+/// is unset, a mask of 0 and 1, or fractions truncated to integers; compositing with these values would give a white
+/// picture.
 const MIN_SEEN_ALPHA: u8 = 8;
 
 /// Converts the samples, and composites transparent pixels over white.

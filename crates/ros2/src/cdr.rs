@@ -75,7 +75,7 @@ impl Writer {
         self.bytes.extend_from_slice(&bytes);
     }
 
-    /// Writes a value with the alignment that it has one byte after an aligned position; the writer must be empty.
+    /// Writes a value aligned as if one byte preceded it; the writer must be empty.
     pub(crate) fn shifted_by_one(&mut self, value: &impl Cdr) {
         let mut shifted = Self { bytes: vec![0] };
         value.write(&mut shifted);
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    /// Reads a value with the alignment that it has one byte after an aligned position.
+    /// Reads a value that was aligned as if one byte preceded it.
     pub(crate) fn shifted_by_one<T: Cdr>(&mut self) -> Result<T, CdrError> {
         let left = self.bytes.get(self.at..).unwrap_or_default();
         let shifted = [&[0], left].concat();

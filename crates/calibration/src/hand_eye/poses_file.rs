@@ -55,7 +55,8 @@ enum Format {
 }
 
 impl Format {
-    /// The format, from the first bytes if they are unambiguous, otherwise from the extension of the file's name.
+    /// The format, from the first line that is neither empty nor a comment if that line is unambiguous, otherwise from
+    /// the extension of the file's name.
     fn of(name: &str, text: &str) -> Self {
         let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
@@ -127,7 +128,7 @@ fn entry_of_row(row: &str, separator: char) -> Result<Entry, CalibrationError> {
         // If both decimals and fields use commas, blanks separate the fields.
         fields = row.split_whitespace().map(|field| field.trim_end_matches(separator)).collect();
     }
-    let expected = || unreadable(format!("as CSV, the line {row:?}, expected {HEADER}"));
+    let expected = || unreadable(format!("as CSV, the line {row:?}, which does not have the fields {HEADER}"));
     let [picture, numbers @ ..] = &fields[..] else { return Err(expected()) };
     let numbers: Option<Vec<f64>> = numbers.iter().map(|field| field.replace(',', ".").parse().ok()).collect();
     let numbers = numbers.filter(|numbers| numbers.len() + 1 == num_fields).ok_or_else(expected)?;

@@ -30,7 +30,8 @@ pub enum MaskBalance {
     #[default]
     Cells,
     /// Larger if the part fills little of its box: the square root of the ratio of outside to inside cells, at most
-    /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box, and a head trained for 300 steps learnt to mark no cell.
+    /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box; with equal weights, a head trained for 300 steps learnt
+    /// to mark no cell.
     ThinParts,
 }
 
@@ -67,7 +68,7 @@ pub struct MaskHeadConfig {
     pub targets: MaskTargets,
     /// Method of pasting a mask into the image.
     pub pasting: MaskPasting,
-    /// Minimum probability of a pixel inside the object.
+    /// Minimum probability at which a pixel counts as inside the object.
     pub threshold: f64,
 }
 

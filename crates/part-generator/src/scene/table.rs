@@ -8,7 +8,8 @@ use crate::tiles::{Tile, Tiles};
 
 mod color;
 
-/// Probability of sheets on a table: brightness varies more within a photograph than on one table top.
+/// Probability of sheets on a table. Sheets are added because brightness varies more within a photograph than on one
+/// table top.
 const SHEETS_PROBABILITY: f32 = 0.4;
 
 /// A layer of noise over the base colour.

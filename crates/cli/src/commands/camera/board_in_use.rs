@@ -20,7 +20,7 @@ pub struct BoardInUse {
     /// Side of a square as designed, in millimetres
     #[arg(long, default_value_t = 25.0, value_name = "MM")]
     square_mm: f64,
-    /// Measured length of the printed 100 mm line; printers scale
+    /// Measured length of the line that is 100 mm long in the drawing; printers may change the scale
     #[arg(long, default_value_t = 100.0, hide_default_value = true, value_name = "MM")]
     measured_mm: f64,
 }

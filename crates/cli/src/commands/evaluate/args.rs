@@ -171,7 +171,7 @@ pub struct EvaluateArgs {
     /// Folder for models and results; results that are already in it are kept and not computed again
     #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
     pub out: PathBuf,
-    /// Folder for the page; default: the folder of the results, with --pictures target/pictures-report
+    /// Folder for the page; default: the folder of the results; for --pictures, target/pictures-report
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Sets of pictures on both sides of a split
