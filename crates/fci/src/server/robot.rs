@@ -256,12 +256,15 @@ impl RobotCore {
                 Err(errors) => self.abort(errors),
             }
         }
-        if is_collision(self.errors) && !self.references.joints.is_at_rest() {
-            // The arm brakes from its measured motion: a reference that moved on would press on the obstacle.
-            self.follow_measurement();
-        }
+        let measured = self.measured();
         let joints = &mut self.references.joints;
-        *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
+        *joints = if joints.is_at_rest() {
+            JointReference::at_rest(joints.q)
+        } else if is_collision(self.errors) {
+            measured.yielding(&self.limits)
+        } else {
+            joints.braked(&self.limits)
+        };
         self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
     }
 
@@ -295,9 +298,14 @@ impl RobotCore {
         self.mode = RobotMode::Reflex;
     }
 
-    fn follow_measurement(&mut self) {
+    /// The measured motion as a reference.
+    fn measured(&self) -> JointReference {
         let Observation { q, dq, .. } = self.observation;
-        self.references.joints = JointReference { q, dq, ddq: JointVector::zeros() };
+        JointReference { q, dq, ddq: JointVector::zeros() }
+    }
+
+    fn follow_measurement(&mut self) {
+        self.references.joints = self.measured();
     }
 
     fn controller_torque(&self, plant: &dyn Plant, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
