@@ -29,8 +29,6 @@ const MAX_PX: f64 = 0.1;
 const SURE: f64 = 0.5;
 /// Maximum difference of two scores that tie.
 const TIE: f64 = 2e-3;
-/// Maximum difference of the scores of a keypoint that is read at another place.
-const KEYPOINT_TIE: f64 = 0.05;
 /// Number of training steps, enough to detect most parts with a high score.
 const STEPS: usize = 90;
 /// Number of unseen pictures, with and without parts.
@@ -143,7 +141,7 @@ struct Comparison {
     box_px: f64,
     keypoint_px: f64,
     /// Number of keypoints, and of those that are read at another place whose score differs by less than
-    /// [`KEYPOINT_TIE`].
+    /// [`TIE`].
     keypoints: usize,
     keypoint_ties: usize,
     score: f64,
@@ -180,7 +178,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
                 } else {
                     made.keypoint_ties += 1;
                     println!("a keypoint's tie: moved {moved_px:.3} px, scores differ by {score:.5}");
-                    assert!(score < KEYPOINT_TIE, "moved {moved_px} px to a score that differs by {score}");
+                    assert!(score < TIE, "moved {moved_px} px to a score that differs by {score}");
                 }
             }
             made.score = made.score.max((expected.scores[i] - of.scores[j]).abs());

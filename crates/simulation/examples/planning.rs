@@ -3,9 +3,9 @@
 //!
 //! - `rate`: configurations that the collision model checks per second on one core.
 //! - `proof`: plans COUNT problems, computes the motion along each path at Franka's full limits, and checks the motion
-//! for collisions in MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity,
-//! acceleration, jerk, torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also
-//! gives the ratios of the durations to those with a stop at every waypoint and to those without a jerk limit.
+//!   for collisions in MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity,
+//!   acceleration, jerk, torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also
+//!   gives the ratios of the durations to those with a stop at every waypoint and to those without a jerk limit.
 //!
 //! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
 //!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
