@@ -18,12 +18,10 @@ export AUDITABLE=1
 for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/deb.sh
     ARCH=$arch scripts/packages/tarball.sh
-    [ "$arch" != amd64 ] || scripts/packages/image.sh
-done
-scripts/packages/windows.sh
-for arch in amd64 arm64; do
     ARCH=$arch scripts/packages/wheel.sh
 done
+scripts/packages/image.sh
+scripts/packages/windows.sh
 
 out=target/packages/release/$version
 rm -rf "$out"

@@ -32,10 +32,10 @@ const TIE: f64 = 2e-3;
 /// Number of training steps, enough to detect most parts with a high score.
 const STEPS: usize = 90;
 /// Number of unseen pictures, with and without parts.
-const PICTURES: u64 = 30;
-/// Minimum number of compared detections. Training is rounded differently on processors with other vector instructions:
-/// with AVX2 alone the network gives 13, with AVX-512 at least 15.
-const MIN_COMPARED: usize = 10;
+const PICTURES: u64 = 45;
+/// Minimum number of compared detections. Training is rounded differently on processors with other vector instructions,
+/// so that the networks give different numbers of detections.
+const MIN_COMPARED: usize = 15;
 
 /// The `edge` network, trained on the pendulum from random initialisation.
 fn trained() -> GeneralizedRcnn {
@@ -173,12 +173,11 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
             made.box_px = made.box_px.max(box_difference(&expected, i, of, j));
             for [moved_px, score] in keypoint_differences(&expected, i, of, j) {
                 made.keypoints += 1;
-                if moved_px < MAX_PX {
-                    made.keypoint_px = made.keypoint_px.max(moved_px);
-                } else {
+                if moved_px >= MAX_PX && score < TIE {
                     made.keypoint_ties += 1;
                     println!("a keypoint's tie: moved {moved_px:.3} px, scores differ by {score:.5}");
-                    assert!(score < TIE, "moved {moved_px} px to a score that differs by {score}");
+                } else {
+                    made.keypoint_px = made.keypoint_px.max(moved_px);
                 }
             }
             made.score = made.score.max((expected.scores[i] - of.scores[j]).abs());
