@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELEASE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage
+.PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser test-web film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -70,10 +70,13 @@ test: setup ## Runs every test
 	@$(CARGO) test $(RELEASE) --locked --workspace --doc -q
 
 # Tests marked as needing Chromium; screenshots stay in target/browser-test.
-test-browser: build web ## Tests our pages in headless Chromium
+test-browser: build ## Tests the program's pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	$(CARGO) test $(RELEASE) --locked --workspace --test cli -- --ignored --test-threads 1 browser:: --skip film::
+
+test-web: build web ## Tests the page that detects in the browser, in headless Chromium
+	@scripts/install.sh chromium chromium-driver
 	$(CARGO) test $(RELEASE) --locked --workspace --test browser -- --ignored --test-threads 1
 
 film: build ## Makes the pictures of the front page, the tour and the gallery, datasets/pictures

@@ -17,7 +17,7 @@ fn png_header(width: u32, height: u32) -> Vec<u8> {
 }
 
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn wrong_files_are_told_apart() {
     let made = Made::new();
     let model = made.model("S");
@@ -63,7 +63,7 @@ fn wrong_files_are_told_apart() {
 }
 
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn a_browser_without_vectors_is_told_so() {
     let site = site();
     // V8 provides WebAssembly SIMD only on processors with SSE 4.1.

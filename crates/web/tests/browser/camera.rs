@@ -4,7 +4,7 @@ use crate::taught::{Made, demonstration};
 use crate::{assert_quiet, complaint, open_model, open_page, screenshots, site};
 
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn a_grasp_is_found_in_the_camera_s_frames() {
     let made = Made::new();
     let model = made.model("S");

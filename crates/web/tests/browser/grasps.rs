@@ -128,7 +128,7 @@ fn assert_same_grasps(results: &[Value], expected: &[Vec<Value>], pictures: &[Pa
 }
 
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
     let made = Made::new();
     let pictures = made.pictures();
@@ -152,7 +152,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
 
 /// On SwiftShader, which is part of Chromium: slower than the processor, but with the shaders of a graphics card.
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn the_graphics_card_finds_what_the_command_line_finds() {
     let made = Made::new();
     let pictures = &made.pictures()[..2];
@@ -194,7 +194,7 @@ fn longest_gap(site: &Site, model: &Path, pictures: &[PathBuf]) -> (Browser, f64
 }
 
 #[test]
-#[ignore = "needs Chromium and target/web: make test-browser"]
+#[ignore = "needs Chromium and target/web: make test-web"]
 fn the_page_stays_fluid_and_fits_small_screens() {
     let made = Made::new();
     let (model, pictures) = (made.model("S"), made.pictures());
@@ -221,7 +221,7 @@ fn the_page_stays_fluid_and_fits_small_screens() {
 }
 
 #[test]
-#[ignore = "needs target/web: make test-browser"]
+#[ignore = "needs target/web: make test-web"]
 fn the_download_is_small() {
     let page = repository().join("target/web");
     let downloads = [(page.clone(), MAX_DOWNLOAD_BYTES), (page.join("webgpu"), MAX_CARD_DOWNLOAD_BYTES)];

@@ -1,7 +1,7 @@
 //! Tests the page in headless Chromium: the same grasps as `sdg detect`, fast and without freezing, and with clear
 //! errors.
 //!
-//! Needs the results of `make web` and `make build`, and Chromium: `make test-browser` provides all of them.
+//! Needs the results of `make web` and `make build`, and Chromium: `make test-web` provides all of them.
 //! Screenshots are kept in target/browser-test.
 #![allow(clippy::unwrap_used)]
 
