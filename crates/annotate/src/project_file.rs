@@ -137,16 +137,20 @@ pub struct Tried {
     pub became: Option<String>,
 }
 
-/// Files named in a project's file that do not exist, for example because their disk is not mounted.
+/// Files named in a project's file that do not exist or cannot be read, for example because their disk is not mounted.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Gone {
     pub photos: Vec<String>,
     pub tried: Vec<Tried>,
+    /// A sentence for the user about each picture that is left out: these, and unreadable ones that were added to the
+    /// folder.
+    pub notes: Vec<String>,
 }
 
 impl Gone {
-    pub fn names(&self) -> impl Iterator<Item = &String> {
-        self.photos.iter().chain(self.tried.iter().map(|tried| &tried.file))
+    /// Records why a picture is left out.
+    pub fn note_unreadable(&mut self, error: &Error) {
+        self.notes.push(format!("{error}; this picture is left out."));
     }
 }
 
@@ -191,7 +195,7 @@ impl ProjectFile {
     }
 
     /// Reads a project's file and, for a folder, adds pictures that were added later. Missing pictures are removed and
-    /// returned separately.
+    /// returned separately; unreadable ones are not added.
     ///
     /// # Errors
     /// The folder cannot be read, the file is not a project's file, or marks belong to another picture.
@@ -203,13 +207,15 @@ impl ProjectFile {
         let is_there = |name: &String| folder.join(name).is_file();
         let (photos, gone_photos) = file.photos.drain(..).partition(is_there);
         let (tried, gone_tried) = file.tried.drain(..).partition(|tried: &Tried| is_there(&tried.file));
-        let gone = Gone { photos: gone_photos, tried: gone_tried };
+        let mut gone = Gone { photos: gone_photos, tried: gone_tried, notes: Vec::new() };
+        let names = gone.photos.iter().chain(gone.tried.iter().map(|tried| &tried.file));
+        gone.notes = names.map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         (file.photos, file.tried) = (photos, tried);
         if file.current_model.is_some_and(|id| id >= file.models.len()) {
             file.current_model = None;
         }
         if place.is_folder {
-            file.add_new(folder, is_new)?;
+            file.add_new(folder, is_new, &mut gone)?;
             // A missing photo may come back; until then, no picture replaces it.
             if gone.photos.is_empty() {
                 file.choose_only_photo();
@@ -228,7 +234,7 @@ impl ProjectFile {
         self.tried.extend(tried);
     }
 
-    fn add_new(&mut self, folder: &Path, is_new: bool) -> Result<()> {
+    fn add_new(&mut self, folder: &Path, is_new: bool, gone: &mut Gone) -> Result<()> {
         for path in pictures_in(folder)? {
             let name = relative(folder, &path);
             let is_known = self.photos.contains(&name)
@@ -237,7 +243,13 @@ impl ProjectFile {
             if is_known {
                 continue;
             }
-            let picture = Picture::open(&path)?;
+            let picture = match Picture::open(&path) {
+                Ok(picture) => picture,
+                Err(error) => {
+                    gone.note_unreadable(&error);
+                    continue;
+                }
+            };
             let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
             if is_marked {
                 self.photos.push(name);
@@ -301,7 +313,8 @@ mod tests {
 
     fn open(folder: &Path) -> (ProjectFile, Vec<String>) {
         let (file, gone) = ProjectFile::open(&ProjectPlace::of_folder(folder)).unwrap();
-        (file, gone.names().cloned().collect())
+        let tried = gone.tried.into_iter().map(|tried| tried.file);
+        (file, gone.photos.into_iter().chain(tried).collect())
     }
 
     const MARKED: &str = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [

@@ -231,7 +231,14 @@ impl MarkedPicture {
     /// # Errors
     /// The picture cannot be read, or the marks belong to another picture.
     pub fn open(path: &Path, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
-        let picture = Picture::open(path)?;
+        Self::of(Picture::open(path)?, annotation)
+    }
+
+    /// As [`open`](Self::open), for a picture that has been read.
+    ///
+    /// # Errors
+    /// The marks belong to another picture.
+    pub fn of(picture: Picture, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
         let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
         // The file that was read, not the file for changes, which may not exist yet.
         let found = opened.found.filter(|_| opened.marks.has_object());

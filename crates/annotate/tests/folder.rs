@@ -1,9 +1,15 @@
 //! A photo's own project, the other pictures of its folder, and projects chosen on the page.
 
-use crate::served::{Served, photo_png};
+use std::sync::Arc;
+
+use crate::served::{InPlace, Served, photo_png};
+use sdg_annotate::{Session, SessionOptions};
 use serde_json::{Value, json};
 
 const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
+
+const LABELME: &str = r#"{"imageWidth": 200, "imageHeight": 100, "shapes": [
+    {"label": "rod", "shape_type": "rectangle", "points": [[40, 40], [140, 60]]}]}"#;
 
 fn folder_of(names: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -56,6 +62,50 @@ fn a_photo_is_opened_again_with_its_models_corrections_and_tried_pictures() {
     let served = Served::of_photo(served.end(), "other.png");
     let other = session(&served);
     assert_eq!((names(&other["images"]), other["models"].as_array().unwrap().len()), (vec!["other.png"], 0));
+}
+
+#[test]
+fn unreadable_pictures_of_a_folder_are_left_out_with_a_note() {
+    let folder = folder_of(&["rod.png", "tried.png"]);
+    std::fs::write(folder.path().join("rod.json"), LABELME).unwrap();
+    std::fs::write(folder.path().join("cut.png"), &photo_png()[..100]).unwrap();
+    let served = Served::of_project(folder);
+    let first = session(&served);
+    assert_eq!((names(&first["images"]), names(&first["trial_pictures"])), (vec!["rod.png"], vec!["tried.png"]));
+    let notes = |session: &Value| session["notes"].as_array().unwrap().clone();
+    let [note] = &notes(&first)[..] else { panic!("one note, found {}", first["notes"]) };
+    let note = note.as_str().unwrap();
+    assert!(note.contains("cut.png: damaged PNG image") && note.ends_with("; this picture is left out."), "{note}");
+
+    // Pictures that the project names already remain named, and return once they can be read.
+    let folder = served.end();
+    for name in ["rod.png", "tried.png"] {
+        std::fs::write(folder.path().join(name), &photo_png()[..100]).unwrap();
+    }
+    let served = Served::of_project(folder);
+    let damaged = session(&served);
+    assert_eq!((names(&damaged["images"]).len(), names(&damaged["trial_pictures"]).len()), (0, 0));
+    assert_eq!(notes(&damaged).len(), 3, "{}", damaged["notes"]);
+    let folder = served.end();
+    for name in ["rod.png", "tried.png", "cut.png"] {
+        std::fs::write(folder.path().join(name), photo_png()).unwrap();
+    }
+    let whole = session(&Served::of_project(folder));
+    assert_eq!((names(&whole["images"]), notes(&whole).len()), (vec!["rod.png"], 0));
+    assert_eq!(names(&whole["trial_pictures"]), ["tried.png", "cut.png"]);
+}
+
+#[test]
+fn a_given_picture_that_is_unreadable_is_refused() {
+    let folder = folder_of(&["rod.png"]);
+    let cut = folder.path().join("cut.png");
+    std::fs::write(&cut, &photo_png()[..100]).unwrap();
+    let images = vec![(folder.path().join("rod.png"), None)];
+    for (images, trial_pictures) in [(images, vec![cut.clone()]), (vec![(cut, None)], Vec::new())] {
+        let options = SessionOptions { images, trial_pictures, ..SessionOptions::default() };
+        let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
+        assert!(refused.contains("cut.png: damaged PNG image"), "{refused}");
+    }
 }
 
 #[test]

@@ -20,19 +20,18 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another picture.
+    /// Neither picture nor camera, a given picture that cannot be read, or marks that belong to another picture.
+    /// Unreadable pictures of the project or of a folder are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
             (None, Some((photo, _))) => Some(ProjectPlace::of_photo(photo)?),
             (None, None) => None,
         };
-        let (project, gone) = match &place {
+        let (project, mut gone) = match &place {
             Some(place) => ProjectFile::open(place)?,
             None => (ProjectFile::default(), Gone::default()),
         };
-        let mut notes: Vec<String> =
-            gone.names().map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
         let mut photos = options.images.clone();
         for name in &project.photos {
@@ -47,15 +46,22 @@ impl Session {
             None => first.clone().or_else(of_camera).ok_or(Error::NoImage)?,
         };
         let mut label = project.label.clone();
-        let images = photos
-            .iter()
-            .map(|(path, annotation)| {
-                let (image, named) = MarkedPicture::open(path, annotation.as_deref())?;
-                label = label.take().or(named);
-                Ok(image)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let trial_pictures = trial_pictures(&project, &folder, &images, &options.trial_pictures)?;
+        let mut images = Vec::new();
+        for (idx, (path, annotation)) in photos.iter().enumerate() {
+            let picture = match Picture::open(path) {
+                Err(error) if idx >= options.images.len() => {
+                    gone.note_unreadable(&error);
+                    gone.photos.push(relative(&folder, path));
+                    continue;
+                }
+                opened => opened?,
+            };
+            let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
+            label = label.take().or(named);
+            images.push(image);
+        }
+        let trial_pictures = trial_pictures(&project, &folder, &images, &options.trial_pictures, &mut gone)?;
+        let mut notes = std::mem::take(&mut gone.notes);
         let temporary = match place {
             Some(_) => None,
             None => {
@@ -155,28 +161,44 @@ impl Session {
     }
 }
 
-/// The pictures of the project, followed by given ones that are not among them.
+/// The pictures of the project, followed by given ones that are not among them. Unreadable pictures of the project or
+/// of a given folder are left out.
 fn trial_pictures(
     project: &ProjectFile,
     folder: &Path,
     images: &[MarkedPicture],
     named: &[PathBuf],
+    gone: &mut Gone,
 ) -> Result<Vec<TrialPicture>> {
     let mut trial_pictures: Vec<TrialPicture> = Vec::new();
     for tried in &project.tried {
-        let picture = Picture { name: tried.name.clone(), ..Picture::open(&folder.join(&tried.file))? };
+        let opened = match Picture::open(&folder.join(&tried.file)) {
+            Ok(opened) => opened,
+            Err(error) => {
+                gone.note_unreadable(&error);
+                gone.tried.push(tried.clone());
+                continue;
+            }
+        };
+        let picture = Picture { name: tried.name.clone(), ..opened };
         let is = |photo: &String, image: &MarkedPicture| relative(folder, &image.picture.path) == *photo;
         let became = tried.became.as_ref().and_then(|photo| images.iter().position(|image| is(photo, image)));
         trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
     }
     for path in named {
-        let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
+        let is_folder = path.is_dir();
+        let paths = if is_folder { pictures_in(path)? } else { vec![path.clone()] };
         for path in paths {
             let is = |known: &Path| relative(folder, known) == relative(folder, &path);
             let taken = images.iter().any(|image| is(&image.picture.path))
                 || trial_pictures.iter().any(|trial| is(&trial.picture.path));
-            if !taken {
-                trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
+            if taken {
+                continue;
+            }
+            match Picture::open(&path) {
+                Ok(picture) => trial_pictures.push(TrialPicture::new(picture, false)),
+                Err(error) if is_folder => gone.note_unreadable(&error),
+                Err(error) => return Err(error),
             }
         }
     }

@@ -19,7 +19,7 @@ use sdg_geometry::{GraspLine, PlanarGrasp};
 use serde_json::Value;
 
 /// A teacher whose model finds the part only where it is in its demonstration; quick, for tests of the page.
-struct InPlace;
+pub struct InPlace;
 
 struct InPlaceModel(Demonstration, Vec<RgbImage>, Mutex<Option<Region>>);
 
