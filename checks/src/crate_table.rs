@@ -1,6 +1,6 @@
 //! The table of crates in ARCHITECTURE.md.
 
-/// A row of the table: a crate, and the workspace's crates that it depends on.
+/// A row of the table: a crate, and the workspace's crates that it depends on, without those that follow from others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CrateRow {
     /// The crate's name without the prefix `sdg-`.

@@ -1,5 +1,5 @@
-//! Links and named files in documents exist, no merge conflict markers remain, and ARCHITECTURE.md's table agrees with
-//! cargo.
+//! Links and named files in documents exist, cells of tables are short, no merge conflict markers remain, and
+//! ARCHITECTURE.md's table agrees with cargo.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -132,8 +132,25 @@ fn files_that_documents_name_exist() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Dependencies by crate, without those for tests and builds; names without `sdg-`.
-fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+/// Longest text of a table's cell, in characters.
+const MAX_CELL: usize = 120;
+
+#[test]
+fn cells_of_tables_are_short() {
+    let mut faults = Vec::new();
+    for document in tracked("*.md") {
+        let text = fs::read_to_string(root().join(&document)).unwrap();
+        for (number, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('|')) {
+            for cell in line.split('|').map(|cell| cell.trim().chars().count()).filter(|len| *len > MAX_CELL) {
+                faults.push(format!("{document}:{}: a cell of {cell} characters, at most {MAX_CELL}", number + 1));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Dependencies by crate, without those for tests and builds, and whether they are optional; names without `sdg-`.
+fn dependencies() -> BTreeMap<String, BTreeMap<String, bool>> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let arguments = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
     let output = Command::new(cargo).args(arguments).current_dir(root()).output().unwrap();
@@ -143,9 +160,21 @@ fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let packages = metadata["packages"].as_array().unwrap();
     let normal = |package: &serde_json::Value| {
         let all = package["dependencies"].as_array().unwrap().iter();
-        all.filter(|dependency| dependency["kind"].is_null()).map(|dependency| short(&dependency["name"])).collect()
+        let all = all.filter(|dependency| dependency["kind"].is_null());
+        all.map(|dependency| (short(&dependency["name"]), dependency["optional"].as_bool().unwrap())).collect()
     };
     packages.iter().map(|package| (short(&package["name"]), normal(package))).collect()
+}
+
+/// The crates that a crate needs without optional features, directly or through others.
+fn needed(name: &str, dependencies: &BTreeMap<String, BTreeMap<String, bool>>) -> BTreeSet<String> {
+    let mut open = vec![name.to_owned()];
+    let mut reached = BTreeSet::new();
+    while let Some(next) = open.pop() {
+        let needed = dependencies.get(&next).into_iter().flatten().filter(|(_, is_optional)| !**is_optional);
+        open.extend(needed.map(|(name, _)| name.clone()).filter(|name| reached.insert(name.clone())));
+    }
+    reached
 }
 
 #[test]
@@ -156,11 +185,22 @@ fn the_crate_table_has_cargo_s_arrows_and_they_point_up_the_table() {
     let crates: BTreeSet<&String> = dependencies.keys().collect();
     assert_eq!(names, crates, "expected the workspace's crates (right) in ARCHITECTURE.md's table (left)");
     for (place, row) in rows.iter().enumerate() {
-        let told: BTreeSet<String> = row.sees.iter().cloned().collect();
-        let seen: BTreeSet<String> =
-            dependencies[&row.name].iter().filter(|name| crates.contains(name)).cloned().collect();
-        assert_eq!(told, seen, "{}: ARCHITECTURE.md's table (left), cargo metadata (right)", row.name);
-        let below: Vec<_> = rows[place..].iter().map(|row| &row.name).filter(|name| seen.contains(*name)).collect();
+        let told: BTreeSet<&String> = row.sees.iter().collect();
+        let seen: BTreeMap<&String, bool> = dependencies[&row.name]
+            .iter()
+            .filter(|(name, _)| crates.contains(name))
+            .map(|(name, is_optional)| (name, *is_optional))
+            .collect();
+        // A crate follows from another one that is always there, or from an optional one if it is optional itself.
+        let follows = |name: &String, is_optional: bool| {
+            seen.iter().any(|(other, is_other_optional)| {
+                *other != name && (is_optional || !is_other_optional) && needed(other, &dependencies).contains(name)
+            })
+        };
+        let expected: BTreeSet<&String> =
+            seen.iter().filter(|(name, is_optional)| !follows(name, **is_optional)).map(|(name, _)| *name).collect();
+        assert_eq!(told, expected, "{}: ARCHITECTURE.md's table (left), cargo metadata (right)", row.name);
+        let below: Vec<_> = rows[place..].iter().map(|row| &row.name).filter(|name| seen.contains_key(*name)).collect();
         assert!(below.is_empty(), "{} depends on {below:?}, which are below it in ARCHITECTURE.md's table", row.name);
     }
 }
@@ -178,7 +218,7 @@ fn crates_that_never_see_burn_do_not() {
         while let Some(next) = open.pop() {
             assert!(!next.starts_with("burn"), "{name} depends on {next}");
             if reached.insert(next.clone()) {
-                open.extend(dependencies.get(&next).into_iter().flatten().cloned());
+                open.extend(dependencies.get(&next).into_iter().flatten().map(|(name, _)| name.clone()));
             }
         }
     }
