@@ -247,6 +247,16 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_of_few_pixels_with_many_bytes_each_is_refused() {
+        let deep: ImageBuffer<Rgba<f32>, _> = ImageBuffer::from_pixel(512, 512, Rgba([0.5; 4]));
+        let bytes = encode(&deep.into(), ImageFormat::Tiff);
+        assert_eq!(decode(&bytes).unwrap().dimensions(), (512, 512));
+        // 16 bytes per pixel, where 8 and one MiB in all are allowed.
+        let error = decode_image(&bytes, &ImageLimits { max_pixels: 512 * 512 }).unwrap_err().to_string();
+        assert!(error.contains("limits"), "{error}");
+    }
+
+    #[test]
     fn grey_deep_and_transparent_pixels_become_rgb() {
         let grey = GrayImage::from_pixel(3, 2, Luma([77]));
         assert_eq!(decode(&encode(&grey.into(), ImageFormat::Png)).unwrap().get_pixel(1, 1).0, [77; 3]);

@@ -103,6 +103,8 @@ mod tests {
             (b"P6 2 1 65535\n", "up to 65535"),
             (b"P6 0 1 255\n", "0 × 1"),
             (b"P6 16384 16384 255\n", "16384 × 16384"),
+            (b"P6 1 16385 255\n", "1 × 16385"),
+            (b"P6 16385 1 255\n", "16385 × 1"),
             (b"P6 99999999999 1 255\n", "99999999999"),
             (b"P6 -2 1 255\n", "in place of a number"),
             (b"P6 2", "ends after 4 bytes"),
@@ -110,5 +112,12 @@ mod tests {
             let error = decode(bytes).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
+    }
+
+    #[test]
+    fn a_head_that_does_not_end_is_refused() {
+        let head = |comment: usize| PpmHead::read(&[b"P6 #".as_slice(), &vec![b'x'; comment]].concat());
+        assert_eq!(head(1000), Ok(None));
+        assert!(head(1100).unwrap_err().contains("without the end of its header"));
     }
 }

@@ -165,14 +165,20 @@ impl<'a> File<'a> {
         let mut at = self.first_page()?;
         while at != 0 {
             let page = self.page(at)?;
-            let mut further: Vec<u64> = page.entry(SUB_DIRECTORIES).map(|entry| entry.values(self)).unwrap_or_default();
+            let further = page.entry(SUB_DIRECTORIES);
+            // The tag may have thousands of values, which may all lead to one directory.
+            if further.is_some_and(|entry| entry.count > MAX_PAGES as u64) {
+                return None;
+            }
+            let mut further = further.map(|entry| entry.values(self)).unwrap_or_default();
             at = page.next;
             pages.push(page);
             further.retain(|sub| *sub != 0 && pages.iter().all(|known| known.at != *sub));
             for sub in further {
                 pages.push(self.page(sub)?);
             }
-            if pages.len() > MAX_PAGES || pages.iter().any(|known| known.at == at) {
+            // This also ends a circle.
+            if pages.len() > MAX_PAGES {
                 return None;
             }
         }
@@ -405,6 +411,61 @@ mod tests {
             let picture = decoded(&file(std::slice::from_ref(&page), is_big)).unwrap();
             assert_eq!(picture.get_pixel(2, 2).0, [200, 100, 50], "big: {is_big}");
         }
+    }
+
+    #[test]
+    fn a_longer_chain_than_the_limit_is_not_followed() {
+        let thumbnails = |count: usize| {
+            let mut pages: Vec<TestPage> = (0..count).map(|_| rgb([4, 3], [9, 9, 9], 1)).collect();
+            pages.push(rgb([8, 6], [10, 20, 30], 0));
+            decoded(&file(&pages, false)).unwrap().dimensions()
+        };
+        assert_eq!(thumbnails(MAX_PAGES - 1), (8, 6));
+        assert_eq!(thumbnails(MAX_PAGES), (4, 3), "the first page is used");
+    }
+
+    /// A little-endian file that consists of one directory with these entries, at position 8.
+    fn directory(entries: &[[u8; 12]]) -> Vec<u8> {
+        let mut bytes = b"II\x2a\0\x08\0\0\0".to_vec();
+        bytes.extend((entries.len() as u16).to_le_bytes());
+        entries.iter().for_each(|entry| bytes.extend(entry));
+        bytes.extend([0; 4]);
+        bytes
+    }
+
+    fn entry(tag: u16, count: u32, value: u32) -> [u8; 12] {
+        // Kind 4: numbers of 32 bits.
+        let parts = [&tag.to_le_bytes()[..], &[4, 0], &count.to_le_bytes(), &value.to_le_bytes()];
+        parts.concat().try_into().unwrap()
+    }
+
+    #[test]
+    fn more_subdirectories_than_pages_are_not_read() {
+        // All offsets, which follow the first directory, lead to one directory with many tags.
+        let pages = |count: u32| {
+            let mut bytes = directory(&[entry(SUB_DIRECTORIES, count, 26)]);
+            bytes.extend((26 + 4 * count).to_le_bytes().repeat(count as usize));
+            bytes.extend(&directory(&[entry(FIRST_PRIVATE_TAG, 1, 0); 100])[8..]);
+            File::new(&bytes).unwrap().pages().map(|pages| pages.len())
+        };
+        let most = MAX_PAGES as u32;
+        assert_eq!(pages(most - 1), Some(MAX_PAGES));
+        assert_eq!(pages(most + 1), None);
+    }
+
+    #[test]
+    fn tags_of_a_page_and_values_of_a_tag_are_bounded() {
+        let most = MAX_ENTRIES as usize;
+        for (count, is_read) in [(most, true), (most + 1, false)] {
+            let bytes = directory(&vec![entry(FIRST_PRIVATE_TAG, 1, 0); count]);
+            assert_eq!(File::new(&bytes).unwrap().page(8).is_some(), is_read, "{count} tags");
+        }
+        let count = 2 * MAX_VALUES as u32;
+        let mut bytes = directory(&[entry(SUB_DIRECTORIES, count, 26)]);
+        bytes.extend(vec![0; 4 * count as usize]);
+        let file = File::new(&bytes).unwrap();
+        let values = file.page(8).unwrap().entry(SUB_DIRECTORIES).unwrap().values(&file);
+        assert_eq!(values.len() as u64, MAX_VALUES);
     }
 
     #[test]
