@@ -135,6 +135,17 @@ mod tests {
     }
 
     #[test]
+    fn a_longer_header_than_any_file_has_is_refused_before_it_is_read() {
+        let padded = |len: u64| {
+            let header = "{}".to_owned() + &" ".repeat(len as usize - 2);
+            read(&mut file(&header, &[])).map(|(tensors, _)| tensors.len())
+        };
+        assert_eq!(padded(MAX_HEADER_BYTES).unwrap(), 0);
+        let refused = padded(MAX_HEADER_BYTES + 1).unwrap_err().to_string();
+        assert!(refused.contains("bytes of the safetensors header"), "{refused}");
+    }
+
+    #[test]
     fn holes_overlaps_and_lies_are_errors() {
         for (header, data) in [
             (r#"{"w":{"dtype":"F32","shape":[1],"data_offsets":[4,8]}}"#, 8),

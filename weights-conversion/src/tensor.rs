@@ -331,6 +331,16 @@ mod tests {
     }
 
     #[test]
+    fn more_axes_than_any_layer_has_are_refused() {
+        let source = source_of(&[0.0]);
+        let of_axes =
+            |count| StoredTensor::view("t", vec![1; count], vec![1; count], 0, ElementType::F32, source.whole());
+        assert!(of_axes(MAX_AXES).is_ok());
+        let refused = of_axes(MAX_AXES + 1).unwrap_err().to_string();
+        assert!(refused.contains("axes") && refused.contains("at most 8, found 9"), "{refused}");
+    }
+
+    #[test]
     fn bytes_as_latin1_text_come_back_across_pieces() {
         let all: Vec<u8> = (0..=255).collect();
         let text: String = all.iter().map(|&byte| char::from(byte)).collect();

@@ -289,16 +289,32 @@ mod tests {
     }
 
     #[test]
-    fn more_entries_than_any_checkpoint_has_are_refused_before_they_are_read() {
-        let mut file = END_RECORD_64.to_le_bytes().to_vec();
-        file.extend([0; 28]);
-        file.extend([MAX_ENTRIES + 1, 0, 0].map(u64::to_le_bytes).concat());
-        file.extend(END_LOCATOR_64.to_le_bytes());
-        file.extend([0; 16]);
-        file.extend(END_RECORD.to_le_bytes());
-        file.extend([0; 18]);
-        let error = ZipArchive::read(&mut Source::from_bytes(file)).err().unwrap().to_string();
+    fn a_larger_directory_than_any_checkpoint_has_is_refused_before_it_is_read() {
+        let refused = |count: u64, len: u64| {
+            let mut file = END_RECORD_64.to_le_bytes().to_vec();
+            file.extend([0; 28]);
+            file.extend([count, len, 0].map(u64::to_le_bytes).concat());
+            file.extend(END_LOCATOR_64.to_le_bytes());
+            file.extend([0; 16]);
+            file.extend(END_RECORD.to_le_bytes());
+            file.extend([0; 18]);
+            ZipArchive::read(&mut Source::from_bytes(file)).err().unwrap().to_string()
+        };
+        let error = refused(MAX_ENTRIES + 1, 0);
         assert!(error.contains("at most 100000, found 100001"), "{error}");
+        let error = refused(1, MAX_DIRECTORY_BYTES + 1);
+        assert!(error.contains("entries of the zip archive"), "{error}");
+    }
+
+    #[test]
+    fn entries_that_are_together_larger_than_the_file_are_refused() {
+        let mut file = archive("archive/data/0", b"weights");
+        let directory = file.windows(4).position(|bytes| bytes == DIRECTORY_ENTRY.to_le_bytes()).unwrap();
+        for size in [directory + 20, directory + 24] {
+            file[size..size + 4].copy_from_slice(&10_000u32.to_le_bytes());
+        }
+        let error = ZipArchive::read(&mut Source::from_bytes(file)).err().unwrap().to_string();
+        assert!(error.contains("entries of at most") && error.contains("10000 bytes"), "{error}");
     }
 
     #[test]

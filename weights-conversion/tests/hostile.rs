@@ -71,6 +71,18 @@ fn sizes_are_checked_before_memory_is_taken() {
         zip(&[("a/data.pkl", &dict_with("w", &rebuild)), ("a/data/0", &[0; 16])])
     };
     read(tensor(b"K\x04\x85K\x01\x85", 4)).unwrap();
+    // Tensors may share their bytes, but not so that a small file takes much memory.
+    let shared = |count: usize| {
+        let storage =
+            cat(&[b"(", &text("storage"), b"ctorch\nFloatStorage\n", &text("0"), &text("cpu"), b"M\x00\x10tQ"]);
+        let rebuild = cat(&[b"ctorch._utils\n_rebuild_tensor_v2\n(", &storage, b"K\x00M\x00\x10\x85K\x01\x85\x89NtR"]);
+        let items: Vec<u8> = (0..count).flat_map(|idx| cat(&[&text(&format!("w{idx}")), &rebuild])).collect();
+        zip(&[("a/data.pkl", &cat(&[b"\x80\x02}(", &items, b"u."])), ("a/data/0", &[0; 4 << 12])])
+    };
+    read(shared(2)).unwrap();
+    assert_refused("shared", shared(4), &["bytes of all tensors", "found 65536"]);
+    let called = cat(&[b"ccollections\nOrderedDict\n(", &b"N".repeat(17), b"tR"]);
+    assert_refused("arguments", dict_with("w", &called), &["a few arguments", "17"]);
     assert_refused("too long", tensor(b"K\x05\x85K\x01\x85", 4), &["w", "a view of 4 elements"]);
     assert_refused("repeating", tensor(b"J\x7f\x7f\x7f\x7f\x85K\x00\x85", 4), &["each at most once"]);
     assert_refused("storage", tensor(b"K\x04\x85K\x01\x85", 1 << 30), &["4294967296 bytes", "16"]);

@@ -216,6 +216,14 @@ mod tests {
     }
 
     #[test]
+    fn the_number_of_a_class_is_bounded() {
+        let last = |class: usize| DataYaml::parse(format!("names:\n  {class}: rod\n").as_bytes());
+        assert_eq!(last(MAX_NAMES - 1).unwrap().names.len(), MAX_NAMES);
+        let refused = last(MAX_NAMES).unwrap_err().to_string();
+        assert!(refused.contains("fewer classes") && refused.contains("100000"), "{refused}");
+    }
+
+    #[test]
     fn keypoints_are_named_by_class_or_for_all() {
         let grasp = |text: &str, class| DataYaml::parse(text.as_bytes()).unwrap().grasp_among_keypoints(class, 2);
         let swapped = Some([1, 0]);

@@ -212,6 +212,18 @@ mod tests {
     }
 
     #[test]
+    fn an_outline_of_too_many_points_is_refused() {
+        let circle = |count: usize| {
+            let turn = std::f64::consts::TAU / count as f64;
+            let points: Vec<_> = (0..count).map(|idx| (turn * idx as f64).sin_cos()).collect();
+            draft(&points.iter().map(|(sin, cos)| (320.0 + 200.0 * cos, 240.0 + 200.0 * sin)).collect::<Vec<_>>())
+        };
+        assert!(circle(1000).finish(&IMAGE).is_ok());
+        let refused = circle(MAX_VERTICES + 1).finish(&IMAGE).unwrap_err().to_string();
+        assert!(refused.contains("a polygon of 3 to 10000 distinct points") && refused.contains("10001"), "{refused}");
+    }
+
+    #[test]
     fn shares_of_the_image_are_told() {
         let outline = draft(&[(0.1, 0.2), (0.5, 0.25), (0.3, 0.7)]);
         let grasp = Draft {

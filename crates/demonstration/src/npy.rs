@@ -205,6 +205,7 @@ pub(crate) mod tests {
             (file("'<f8'", "False", "(4000000000, 4)", &[0; 32]), "expected 128000000000 bytes"),
             (file("'<f8'", "False", "(9223372036854775807, 4)", &[]), "more than any file has"),
             (file("'<f8'", "False", "(-1, 4)", &[]), "a shape such as"),
+            (file("'<f8'", "False", "(1, 1, 1, 1, 1, 1, 1, 1, 1)", &[0; 8]), "a shape such as"),
             (file("'|O'", "False", "(1, 4)", &[]), "expected numbers of type f4, f8, i4 or i8, found '|O'"),
             (file("[('x', '<f4'), ('y', '<f4')]", "False", "(1,)", &[0; 8]), "numbers of type"),
             (file("'<f8'", "Maybe", "(1,)", &[0; 8]), "fortran_order"),

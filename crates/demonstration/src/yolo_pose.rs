@@ -249,6 +249,12 @@ mod tests {
     }
 
     #[test]
+    fn more_objects_than_a_photo_has_are_refused() {
+        let refused = read_text(&"0 0.5 0.5 0.25 0.5\n".repeat(MAX_OBJECTS + 1)).unwrap_err().to_string();
+        assert!(refused.contains("line 10001") && refused.contains("at most 10000 objects"), "{refused}");
+    }
+
+    #[test]
     fn data_yaml_names_the_class_and_says_how_to_read() {
         let yaml = b"kpt_shape: [3, 2]\nnames: [rod, pendulum]\n";
         // By itself this row would be two keypoints with visibilities 1.

@@ -253,7 +253,7 @@ mod tests {
         assert_eq!(decode(&bytes).unwrap().dimensions(), (512, 512));
         // 16 bytes per pixel, where 8 and one MiB in all are allowed.
         let error = decode_image(&bytes, &ImageLimits { max_pixels: 512 * 512 }).unwrap_err().to_string();
-        assert!(error.contains("limits"), "{error}");
+        assert!(error.contains("Memory limit"), "{error}");
     }
 
     #[test]
