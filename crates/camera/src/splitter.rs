@@ -185,6 +185,15 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_that_does_not_end_is_given_up() {
+        let jpeg = crate::decode::tests::jpeg(20, 10);
+        let endless = [&jpeg[..jpeg.len() - 2], &vec![0; MAX_ENCODED_BYTES], &jpeg].concat();
+        let (found, rest) = split(&endless, 1 << 20);
+        assert_eq!(found[0], Err(format!("a picture of more than {MAX_ENCODED_BYTES} bytes")));
+        assert_eq!(rest, None);
+    }
+
+    #[test]
     fn torn_pictures_and_garbage_are_told_and_passed_over() {
         let jpeg = crate::decode::tests::jpeg(20, 10);
         let stream = [b"hello P6x ".as_slice(), &jpeg[..400], &jpeg, b"P6 0 0 255\n", &png(), &jpeg[..99]].concat();

@@ -147,6 +147,7 @@ fn places_that_cannot_be_name_the_line() {
         (40, "[350, -400]", "[350, -480]", "\"tray\" reaches over the table's edge: its corner is at (320, -505) mm"),
         (40, "columns = 5", "columns = 20", "\"tray\" reaches over the table's edge: its corner is at (1520, -425)"),
         (41, "columns = 5", "columns = 0", "columns: expected a whole number from 1 to 100, found 0"),
+        (41, "columns = 5", "columns = 101", "columns: expected a whole number from 1 to 100, found 101"),
         (42, "rows = 4", "rows = -4", "rows: expected a whole number from 1 to 100, found -4"),
         (43, "[60, 50]", "[60, 0]", "pitch_mm: expected lengths from 5 to 1000 mm"),
         (43, "[60, 50]", "[60, nan]", "pitch_mm: expected lengths"),
