@@ -170,6 +170,21 @@ mod tests {
     }
 
     #[test]
+    fn of_many_unread_errors_the_newest_are_kept() {
+        let (send, receive) = channel();
+        let (asked, was_asked) = channel();
+        let mut latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
+        // Declared last: see below.
+        let send = send;
+        for _ in 0..MAX_ERRORS + 5 {
+            was_asked.recv().unwrap();
+            send.send(None).unwrap();
+        }
+        was_asked.recv().unwrap();
+        assert_eq!(std::iter::from_fn(|| latest.take(Duration::ZERO).err()).count(), MAX_ERRORS);
+    }
+
+    #[test]
     fn the_newest_frame_is_given_and_the_others_are_counted() {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();

@@ -128,6 +128,39 @@ fn foreign_names_other_pages_and_other_methods_are_refused() {
 }
 
 #[test]
+fn a_request_without_end_is_refused() {
+    let server = MjpegServer::start(0).unwrap();
+    let mut stream = connect(&server);
+    // The last byte is the first one too many, so that the server has read all of them when it answers.
+    let head = b"GET / HTTP/1.1\r\nX: ";
+    stream.write_all(&[head.as_slice(), &vec![b'a'; (16 << 10) + 1 - head.len()]].concat()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
+}
+
+#[test]
+fn more_connections_than_any_user_needs_are_closed() {
+    let server = MjpegServer::start(0).unwrap();
+    server.publish(picture(7), "level 7");
+    let request = format!("GET /stream HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", port(&server));
+    let is_answered = |stream: &mut TcpStream| {
+        stream.write_all(request.as_bytes()).is_ok() && stream.read(&mut [0; 8]).is_ok_and(|count| count > 0)
+    };
+    let mut open: Vec<TcpStream> = (0..32).map(|_| connect(&server)).collect();
+    assert!(open.iter_mut().all(is_answered));
+    assert!(!is_answered(&mut connect(&server)));
+    // A place becomes free when the server notices that a browser has gone.
+    open.pop();
+    let start = Instant::now();
+    while !is_answered(&mut connect(&server)) {
+        assert!(start.elapsed() < Duration::from_secs(20), "no place became free");
+        server.publish(picture(9), "level 9");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
 fn before_the_first_picture_and_on_a_port_that_is_taken() {
     let server = MjpegServer::start(0).unwrap();
     assert!(ask(&server, "GET /snapshot.jpg HTTP/1.1\r\nHost: localhost:PORT").starts_with("HTTP/1.1 503"));

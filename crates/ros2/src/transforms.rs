@@ -237,6 +237,17 @@ mod tests {
     }
 
     #[test]
+    fn of_many_poses_the_newest_are_kept() {
+        let mut transforms = Transforms::new(0.5);
+        for tick in 0..MAX_POSES + 100 {
+            transforms.add(&transform("base", "hand", tick as f64 * 1e-3, along(0.0, 0.0)), false);
+        }
+        let Motion::Moving(poses) = &transforms.frames["hand"].motion else { panic!() };
+        assert_eq!(poses.len(), MAX_POSES);
+        assert!((poses.front().unwrap().0 - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
     fn ten_seconds_are_kept() {
         let mut transforms = Transforms::new(0.5);
         for tick in 0..3000 {
