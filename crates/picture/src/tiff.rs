@@ -451,6 +451,13 @@ mod tests {
         let most = MAX_PAGES as u32;
         assert_eq!(pages(most - 1), Some(MAX_PAGES));
         assert_eq!(pages(most + 1), None);
+        // Nor are they counted by reading them: here all are the directory itself, which is not read again.
+        let own = |count: u32| {
+            let mut bytes = directory(&[entry(SUB_DIRECTORIES, count, 26)]);
+            bytes.extend(8u32.to_le_bytes().repeat(count as usize));
+            File::new(&bytes).unwrap().pages().map(|pages| pages.len())
+        };
+        assert_eq!((own(most), own(most + 1)), (Some(1), None));
     }
 
     #[test]
