@@ -173,7 +173,7 @@ mod tests {
     fn of_many_unread_errors_the_newest_are_kept() {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();
-        let mut latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
+        let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
         // Declared last: see below.
         let send = send;
         for _ in 0..MAX_ERRORS + 5 {

@@ -29,6 +29,9 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     Ok(instances.into_iter().map(|instance| instance.annotation).collect())
 }
 
+/// Maximum number of annotations of an image times categories. For each annotation all categories are searched.
+const MAX_COMPARISONS: usize = 10_000_000;
+
 /// Reads the objects of one image of a COCO file, if any.
 pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) -> Result<Vec<LabelledInstance>> {
     let images = root.field("images", "the list of images")?.items()?;
@@ -47,6 +50,13 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
         if is_same_id(annotation.field("image_id", "the number of its image")?.value, image_id.value) {
             of_image.push(annotation);
         }
+    }
+    if of_image.len().saturating_mul(categories.len()) > MAX_COMPARISONS {
+        return Err(Error::Malformed {
+            place: "annotations and categories".into(),
+            expected: format!("at most {MAX_COMPARISONS} pairs of both"),
+            found: format!("{} times {}", of_image.len(), categories.len()),
+        });
     }
     // If only crowds and masks are marked, they are kept, and reading them gives a specific error.
     if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
@@ -410,6 +420,17 @@ mod tests {
         let made = read_named(&value, None).unwrap();
         assert_eq!(made[0].bbox, BoundingBox { x1: 110.0, y1: 90.0, x2: 290.0, y2: 250.0 });
         assert_eq!(made[0].grasp, None);
+    }
+
+    #[test]
+    fn annotations_times_categories_are_bounded() {
+        const COUNT: usize = 3200;
+        let mut value = full();
+        let annotation = json!({"image_id": value["annotations"][0]["image_id"], "category_id": "none"});
+        value["annotations"] = vec![annotation; COUNT].into();
+        value["categories"] = (0..COUNT).map(|id| json!({"id": id})).collect();
+        let refused = read_named(&value, None).unwrap_err().to_string();
+        assert!(refused.contains("at most 10000000 pairs") && refused.contains("3200 times 3200"), "{refused}");
     }
 
     #[test]

@@ -51,6 +51,9 @@ impl DataYaml {
             data.names[class] = name;
         }
         data.keypoint_names = keypoint_names(text);
+        if data.keypoint_names.len() > MAX_NAMES {
+            return Err(malformed("kpt_names", "fewer classes", &data.keypoint_names.len().to_string()));
+        }
         Ok(data)
     }
 
@@ -113,9 +116,13 @@ fn entry(text: &str, name: &str) -> Option<Vec<(Option<String>, String)>> {
     if !rest.trim().is_empty() {
         // A list or a map in brackets, which may continue over lines.
         let mut whole = rest.trim().to_owned();
-        while !whole.contains([']', '}']) {
+        let mut is_closed = whole.contains([']', '}']);
+        while !is_closed {
+            let line = without_comment(lines.next()?);
+            // Only the new line is searched: the text may have as many lines as bytes.
+            is_closed = line.contains([']', '}']);
             whole += " ";
-            whole += without_comment(lines.next()?);
+            whole += line;
         }
         let inside = whole.trim_matches(|c: char| "[]{} ".contains(c));
         return Some(split_items(inside).iter().map(|item| keyed(item, whole.starts_with('{'))).collect());
@@ -221,6 +228,18 @@ mod tests {
         assert_eq!(last(MAX_NAMES - 1).unwrap().names.len(), MAX_NAMES);
         let refused = last(MAX_NAMES).unwrap_err().to_string();
         assert!(refused.contains("fewer classes") && refused.contains("100000"), "{refused}");
+        let many = format!("kpt_names: {{{}}}\n", "0: ".repeat(MAX_NAMES + 1));
+        let refused = DataYaml::parse(many.as_bytes()).unwrap_err().to_string();
+        assert!(refused.contains("kpt_names") && refused.contains("100001"), "{refused}");
+    }
+
+    #[test]
+    fn a_list_over_many_lines_takes_linear_time() {
+        // Quadratic time would be a quarter of an hour.
+        let started = std::time::Instant::now();
+        let text = format!("names: [rod,{}\nbolt]\n", "\n".repeat(1_500_000));
+        assert_eq!(DataYaml::parse(text.as_bytes()).unwrap().names, ["rod", "bolt"]);
+        assert!(started.elapsed().as_secs() < 60);
     }
 
     #[test]

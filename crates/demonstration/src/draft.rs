@@ -13,6 +13,9 @@ const MIN_EXTENT_PX: f64 = 1.0;
 /// More vertices than any person draws; limits the time for checking an outline.
 const MAX_VERTICES: usize = 10_000;
 
+/// Maximum length of a label in bytes. Each object has its own copy.
+const MAX_LABEL_BYTES: usize = 1000;
+
 /// The data of one object, each with its position in the file.
 #[derive(Default)]
 pub(crate) struct Draft {
@@ -119,6 +122,13 @@ impl Draft {
         };
         let jaw_width = self.jaw_width.map(|(width, place)| check_jaw_width(width, place, image)).transpose()?;
         let label = self.label.filter(|label| !label.is_empty()).unwrap_or_else(|| "object".into());
+        if label.len() > MAX_LABEL_BYTES {
+            return Err(Error::Malformed {
+                place: self.place,
+                expected: format!("a label of at most {MAX_LABEL_BYTES} bytes"),
+                found: format!("{} bytes", label.len()),
+            });
+        }
         Ok(Annotation { label, bbox, grasp, jaw_width, outline })
     }
 }
@@ -221,6 +231,17 @@ mod tests {
         assert!(circle(1000).finish(&IMAGE).is_ok());
         let refused = circle(MAX_VERTICES + 1).finish(&IMAGE).unwrap_err().to_string();
         assert!(refused.contains("a polygon of 3 to 10000 distinct points") && refused.contains("10001"), "{refused}");
+    }
+
+    #[test]
+    fn a_label_of_too_many_bytes_is_refused() {
+        let of_label = |count: usize| {
+            let part = draft(&[(10.0, 20.0), (50.0, 25.0), (30.0, 70.0)]);
+            Draft { label: Some("é".repeat(count)), place: "there".into(), ..part }.finish(&IMAGE)
+        };
+        assert!(of_label(MAX_LABEL_BYTES / 2).is_ok());
+        let refused = of_label(MAX_LABEL_BYTES / 2 + 1).unwrap_err().to_string();
+        assert!(refused.contains("there") && refused.contains("1002 bytes"), "{refused}");
     }
 
     #[test]

@@ -31,6 +31,9 @@ const MAX_COVER: f64 = 0.5;
 const BOX_CONTRAST: f64 = 100.0;
 /// Number of samples across and down, over the region and its surroundings, or over the photo.
 const GRID: u32 = 64;
+/// Maximum number of positions compared along a border, besides one for each side; only a hostile outline has more
+/// pixels of length.
+const MAX_BORDER_SAMPLES: f64 = 100_000.0;
 /// Width of the surroundings, as a fraction of the region's mean side.
 const SURROUNDINGS: f64 = 0.25;
 /// Steps of a colour channel in a histogram.
@@ -156,10 +159,11 @@ fn border_contrast(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> 
         image.get_pixel(inside(at.x, image.width()), inside(at.y, image.height())).0.map(f64::from)
     };
     let (mut sum, mut count) = (0.0, 0.0_f64);
-    for (start, end) in corners.iter().zip(corners.iter().cycle().skip(1)) {
-        let side = end - start;
+    let sides = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(start, end)| (start, end - start));
+    let step_px = (sides().map(|(_, side)| side.norm()).sum::<f64>() / MAX_BORDER_SAMPLES).max(1.0);
+    for (start, side) in sides() {
         let across = Vector2::new(-side.y, side.x).try_normalize(f64::EPSILON).unwrap_or_default() * reach;
-        let num_steps = side.norm().ceil() as u32;
+        let num_steps = (side.norm() / step_px).ceil() as u32;
         for step in 0..num_steps {
             let at = start + side * (f64::from(step) / f64::from(num_steps));
             let (one, other) = (color(at + across), color(at - across));

@@ -14,6 +14,10 @@ const MIN_ZEROS: usize = 32;
 const ADDED_BYTES: usize = 64;
 /// Number of bytes replaced at the end of the data, for the same purpose.
 const EXCHANGED_BYTES: usize = 8;
+/// Maximum number of stretches whose end is tested, and of pixels decoded for this, at least those of one stretch: the
+/// picture is decoded up to four times for each. The order of restart markers is tested for all of them.
+const MAX_TESTED: u64 = 8;
+const MAX_TESTED_PIXELS: u64 = 400_000_000;
 /// Two fill values, because the original bytes may happen to give the same result as one of them.
 const PROBES: [u8; 2] = [0x55, 0xaa];
 
@@ -35,6 +39,7 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
         let data = &jpeg[stretch.start..stretch.end];
         data.windows(MIN_ZEROS).position(|run| run.iter().all(|byte| *byte == 0)).map(|at| stretch.start + at)
     };
+    let mut ends: Option<Ends<'_>> = None;
     for (idx, stretch) in stretches.iter().enumerate() {
         let Some(at) = zeros_in(stretch) else { continue };
         let before = idx.checked_sub(1).and_then(|before| stretches[before].restart);
@@ -43,7 +48,7 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
             (None, Some(after)) => after == 0,
             (_, None) => true,
         };
-        if !is_in_order || !ends_with_its_blocks(jpeg, stretch) {
+        if !is_in_order || !ends.get_or_insert_with(|| Ends::of(jpeg)).ends_with_its_blocks(stretch) {
             let count = jpeg[at..].iter().take_while(|byte| **byte == 0).count();
             let reason = format!(
                 "{count} zeros in a row from byte {at} in place of picture data: copy the file again from its source"
@@ -54,23 +59,43 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// Whether the decoder reads the data of a stretch to their end, and needs no data beyond.
-fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
-    let decoded =
-        |bytes: &[u8]| -> Option<DynamicImage> { image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok() };
-    let Some(whole) = decoded(jpeg) else { return true };
-    // A picture of one colour may consist only of zero codes, and missing blocks are filled with the same colour.
-    let first = whole.get_pixel(0, 0);
-    if whole.pixels().all(|(.., pixel)| pixel == first) {
-        return true;
+fn decoded(jpeg: &[u8]) -> Option<DynamicImage> {
+    image::load_from_memory_with_format(jpeg, ImageFormat::Jpeg).ok()
+}
+
+/// Tests the ends of stretches.
+struct Ends<'a> {
+    jpeg: &'a [u8],
+    /// `None` if the picture cannot be decoded, or has one colour. Such a picture may consist only of zero codes, and
+    /// missing blocks are filled with the same colour.
+    whole: Option<DynamicImage>,
+    /// Number of stretches that may still be tested.
+    left: u64,
+}
+
+impl<'a> Ends<'a> {
+    fn of(jpeg: &'a [u8]) -> Self {
+        let whole = decoded(jpeg).filter(|whole| {
+            let first = whole.get_pixel(0, 0);
+            whole.pixels().any(|(.., pixel)| pixel != first)
+        });
+        let pixels = whole.as_ref().map_or(1, |whole| u64::from(whole.width()) * u64::from(whole.height()));
+        Self { jpeg, whole, left: (MAX_TESTED_PIXELS / (4 * pixels)).clamp(1, MAX_TESTED) }
     }
-    let is_same = |kept_to: usize, filler: &[u8]| {
-        decoded(&[&jpeg[..kept_to], filler, &jpeg[stretch.end..]].concat()).is_some_and(|other| other == whole)
-    };
-    let runs_out = PROBES.into_iter().any(|probe| !is_same(stretch.end, &[probe; ADDED_BYTES]));
-    let last = stretch.end.saturating_sub(EXCHANGED_BYTES).max(stretch.start);
-    let is_left_over = PROBES.into_iter().all(|probe| is_same(last, &[probe; EXCHANGED_BYTES]));
-    !runs_out && !is_left_over
+
+    /// Whether the decoder reads the data of a stretch to their end, and needs no data beyond.
+    fn ends_with_its_blocks(&mut self, stretch: &Stretch) -> bool {
+        let Some(whole) = self.whole.as_ref().filter(|_| self.left > 0) else { return true };
+        self.left -= 1;
+        let is_same = |kept_to: usize, filler: &[u8]| {
+            let changed = [&self.jpeg[..kept_to], filler, &self.jpeg[stretch.end..]].concat();
+            decoded(&changed).is_some_and(|other| other == *whole)
+        };
+        let runs_out = PROBES.into_iter().any(|probe| !is_same(stretch.end, &[probe; ADDED_BYTES]));
+        let last = stretch.end.saturating_sub(EXCHANGED_BYTES).max(stretch.start);
+        let is_left_over = PROBES.into_iter().all(|probe| is_same(last, &[probe; EXCHANGED_BYTES]));
+        !runs_out && !is_left_over
+    }
 }
 
 /// All entropy-coded data; invalid data end the list.
