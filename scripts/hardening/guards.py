@@ -54,7 +54,7 @@ GUARDS = [
     ("motion JPEG: a part without length", "crates/camera/src/http/multipart.rs", "if self.buffer.len() > MAX_ENCODED_BYTES {", "if self.buffer.len() > usize::MAX - 1 {", "sdg-camera"),
     ("program's pictures: a picture's bytes", "crates/camera/src/splitter.rs", "Extent::NotYet if bytes.len() > MAX_ENCODED_BYTES =>", "Extent::NotYet if bytes.len() > usize::MAX - 1 =>", "sdg-camera"),
     ("program's pictures: a PNG's part", "crates/camera/src/splitter.rs", "if length > MAX_ENCODED_BYTES {", "if length > usize::MAX - 1 {", "sdg-camera"),
-    ("program's pictures: what is none", "crates/camera/src/splitter.rs", "if self.garbage_bytes >= MAX_GARBAGE_BYTES {", "if self.garbage_bytes >= usize::MAX {", "sdg-camera"),
+    ("program's pictures: bytes that belong to no picture", "crates/camera/src/splitter.rs", "if self.garbage_bytes >= MAX_GARBAGE_BYTES {", "if self.garbage_bytes >= usize::MAX {", "sdg-camera"),
     ("camera over HTTP: the password stays with its host", "crates/camera/src/http/url.rs", "if url.authority == self.authority && url.credentials.is_none() {", "if url.credentials.is_none() {", "sdg-camera"),
     ("latest frame: errors that are kept", "crates/camera/src/latest.rs", "if newest.errors.len() == MAX_ERRORS {", "if newest.errors.len() == usize::MAX {", "sdg-camera"),
     ("live page: Host", "crates/camera/src/server.rs", "if !(hosts.next().is_some_and(|host| is_own(&host)) && hosts.next().is_none()) {", "if hosts.next().is_none() {", "sdg-camera"),
