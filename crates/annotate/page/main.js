@@ -17,7 +17,7 @@ import { onChange, state } from "./store.js";
 import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
 import { renderTeach, watch } from "./teach.js";
-import { toast } from "./toast.js";
+import { notice } from "./toast.js";
 import { renderTry } from "./try.js";
 import { renderVersions } from "./versions.js";
 import { fitOrPart } from "./keyboard.js";
@@ -83,7 +83,7 @@ async function open(session) {
   by("projects").hidden = !session.can_close;
   if (!state.images.length && !state.camera && state.others.length) openFolder("photo");
   watch();
-  session.notes.forEach(toast);
+  notice(session.notes);
   sendKept(state.project);
   beat();
 }

@@ -148,9 +148,10 @@ pub struct Gone {
 }
 
 impl Gone {
-    /// Records why a picture is left out.
-    pub fn note_unreadable(&mut self, error: &Error) {
-        self.notes.push(format!("{error}; this picture is left out."));
+    /// Opens a picture. If it cannot be read, a note says why it is left out.
+    pub fn open(&mut self, path: &Path) -> Option<Picture> {
+        let unreadable = |error| self.notes.push(format!("{error}; this picture is left out."));
+        Picture::open(path).map_err(unreadable).ok()
     }
 }
 
@@ -243,13 +244,7 @@ impl ProjectFile {
             if is_known {
                 continue;
             }
-            let picture = match Picture::open(&path) {
-                Ok(picture) => picture,
-                Err(error) => {
-                    gone.note_unreadable(&error);
-                    continue;
-                }
-            };
+            let Some(picture) = gone.open(&path) else { continue };
             let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
             if is_marked {
                 self.photos.push(name);

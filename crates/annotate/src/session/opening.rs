@@ -48,13 +48,11 @@ impl Session {
         let mut label = project.label.clone();
         let mut images = Vec::new();
         for (idx, (path, annotation)) in photos.iter().enumerate() {
-            let picture = match Picture::open(path) {
-                Err(error) if idx >= options.images.len() => {
-                    gone.note_unreadable(&error);
-                    gone.photos.push(relative(&folder, path));
-                    continue;
-                }
-                opened => opened?,
+            let is_given = idx < options.images.len();
+            let opened = if is_given { Some(Picture::open(path)?) } else { gone.open(path) };
+            let Some(picture) = opened else {
+                gone.photos.push(relative(&folder, path));
+                continue;
             };
             let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
             label = label.take().or(named);
@@ -172,13 +170,9 @@ fn trial_pictures(
 ) -> Result<Vec<TrialPicture>> {
     let mut trial_pictures: Vec<TrialPicture> = Vec::new();
     for tried in &project.tried {
-        let opened = match Picture::open(&folder.join(&tried.file)) {
-            Ok(opened) => opened,
-            Err(error) => {
-                gone.note_unreadable(&error);
-                gone.tried.push(tried.clone());
-                continue;
-            }
+        let Some(opened) = gone.open(&folder.join(&tried.file)) else {
+            gone.tried.push(tried.clone());
+            continue;
         };
         let picture = Picture { name: tried.name.clone(), ..opened };
         let is = |photo: &String, image: &MarkedPicture| relative(folder, &image.picture.path) == *photo;
@@ -195,11 +189,8 @@ fn trial_pictures(
             if taken {
                 continue;
             }
-            match Picture::open(&path) {
-                Ok(picture) => trial_pictures.push(TrialPicture::new(picture, false)),
-                Err(error) if is_folder => gone.note_unreadable(&error),
-                Err(error) => return Err(error),
-            }
+            let opened = if is_folder { gone.open(&path) } else { Some(Picture::open(&path)?) };
+            trial_pictures.extend(opened.map(|picture| TrialPicture::new(picture, false)));
         }
     }
     if trial_pictures.len() > MAX_TRIAL_PICTURES {

@@ -291,6 +291,34 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn unreadable_pictures_are_named_until_the_note_is_confirmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("project");
+    std::fs::create_dir(&project).unwrap();
+    std::fs::copy(shipped_photo(), project.join("photo.png")).unwrap();
+    for name in ["cut", "short"] {
+        std::fs::write(project.join(format!("{name}.png")), &std::fs::read(shipped_photo()).unwrap()[..200]).unwrap();
+    }
+    let page = Page::open_in(folder, &["project"]);
+    page.wait_for("the photo", "const p = document.getElementById('photo'); return p.complete && p.naturalWidth");
+    // Other notes end after 3.5 seconds.
+    std::thread::sleep(std::time::Duration::from_secs(5));
+    let sentences = "return [...document.querySelectorAll('#toasts p')].map((p) => p.innerText)";
+    let sentences = page.browser.run(sentences, &[]).unwrap();
+    let sentences: Vec<&str> = sentences.as_array().unwrap().iter().map(|one| one.as_str().unwrap()).collect();
+    assert_eq!(sentences.len(), 2, "{sentences:?}");
+    for (name, sentence) in ["cut.png", "short.png"].iter().zip(&sentences) {
+        assert!(sentence.contains(name) && sentence.ends_with("this picture is left out."), "{sentence}");
+    }
+    page.screenshot("project-9-unreadable");
+    page.assert_accessible("unreadable pictures");
+    page.click("#toasts button");
+    page.wait_for("no note", "return document.getElementById('toasts').children.length === 0");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
