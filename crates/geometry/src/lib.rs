@@ -37,6 +37,7 @@ mod outline;
 mod planar_grasp;
 mod planar_similarity;
 mod polygon;
+mod polygon_thinning;
 mod rotational_symmetry;
 mod slant;
 mod statistics;

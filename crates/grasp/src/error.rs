@@ -83,6 +83,18 @@ pub enum GraspError {
     /// No demonstration was given.
     #[error("expected at least one demonstration, found none")]
     NoDemonstration,
+    /// More demonstrations than a model holds.
+    #[error("expected at most {most} demonstrations, found {found}")]
+    TooManyDemonstrations { most: usize, found: usize },
+    /// Marked parts with too many pixels in all.
+    #[error(
+        "expected marked parts of at most {most} megapixels in all photos together, found more: use fewer or smaller \
+         photos"
+    )]
+    PartsTooLarge {
+        /// In millions of pixels.
+        most: u64,
+    },
     /// Demonstrations of different parts.
     #[error("expected demonstrations of one part: {expected}; found {found}")]
     ContradictingDemonstrations {

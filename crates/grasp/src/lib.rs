@@ -56,6 +56,7 @@ mod base_weights;
 mod base_weights_file;
 mod check_config;
 mod colors;
+mod cutout_budget;
 mod decimal;
 mod detection;
 mod device;

@@ -21,7 +21,7 @@ use burn::tensor::Device;
 use image::ImageFormat;
 use safetensors::{Dtype, SafeTensors};
 use sdg_comparison::ComparisonConfig;
-use sdg_demonstration::{ImageLimits, decode_image};
+use sdg_demonstration::{ImageLimits, PictureError, decode_image};
 use sdg_detection::RcnnConfig;
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_orientation::OrientationConfig;
@@ -29,6 +29,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::check_config::CheckConfig;
+use crate::cutout_budget::{CutoutBudget, check_count};
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model::GraspModel;
@@ -40,9 +41,6 @@ use crate::taught_marks::TaughtMarks;
 
 /// The version that this code writes. It is increased by any change that an older reader would misread.
 pub const FORMAT_VERSION: u32 = 3;
-
-/// Maximum number of demonstrations in a file, far above practical use; limits the work on a forged file.
-const MAX_DEMONSTRATIONS: usize = 1000;
 
 /// The metadata of a file, without its weights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -129,27 +127,21 @@ impl GraspModel {
 
         let kind: ModelKind = metadata.text("model")?.parse()?;
         let marks: Vec<TaughtMarks> = metadata.json("demonstrations")?;
-        if marks.is_empty() || marks.len() > MAX_DEMONSTRATIONS {
-            return Err(GraspError::Damaged {
-                expected: format!("1 to {MAX_DEMONSTRATIONS} demonstrations"),
-                found: marks.len().to_string(),
-            });
-        }
+        check_count(marks.len())?;
         let mut facts: TeachingFacts = metadata.json("teaching")?;
         let region = facts.region.take();
         if let Some(lengths) = facts.lengths {
             lengths.check()?;
         }
+        let mut budget = CutoutBudget::default();
         let demonstrations = marks
             .into_iter()
             .enumerate()
             .map(|(i, marks)| {
                 let png = tensor(&file, &format!("demonstrations.{i}.cutout"), Dtype::U8)?;
-                let cutout =
-                    decode_image(png.data(), &ImageLimits::default()).map_err(|error| GraspError::Damaged {
-                        expected: "a photo of the part that can be decoded".to_owned(),
-                        found: error.to_string(),
-                    })?;
+                let limits = budget.limits(&marks);
+                let cutout = decode_image(png.data(), &limits).map_err(|error| not_a_cutout(error, &limits))?;
+                budget.take(&cutout)?;
                 let mut check = CheckConfig::DEFAULT;
                 if let Some([low, high]) = facts.size_tolerance {
                     check.search.scales = low..=high;
@@ -255,6 +247,17 @@ fn tensor<'a>(file: &SafeTensors<'a>, name: &str, dtype: Dtype) -> Result<safete
     Ok(view)
 }
 
+fn not_a_cutout(error: PictureError, limits: &ImageLimits) -> GraspError {
+    let (expected, found) = match error {
+        PictureError::EnormousImage { width, height, .. } => (
+            format!("a photo of the part of at most {} pixels, according to its marks", limits.max_pixels),
+            format!("{width} × {height}"),
+        ),
+        other => ("a photo of the part that can be decoded".to_owned(), other.to_string()),
+    };
+    GraspError::Damaged { expected, found }
+}
+
 struct Metadata(HashMap<String, String>);
 
 impl Metadata {
@@ -332,6 +335,7 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutout_budget::MAX_DEMONSTRATIONS;
     use crate::network_calibration::NetworkCalibration;
     use crate::region::SearchRegion;
     use crate::score_calibration::ScoreCalibration;
@@ -428,6 +432,39 @@ mod tests {
         let forged = with_metadata(&bytes, r#"\"height\":110"#, r#"\"height\":999"#);
         let refused = GraspModel::from_bytes(&forged, &Device::flex()).unwrap_err().to_string();
         assert!(refused.contains("within the picture of 640 × 480"), "{refused}");
+    }
+
+    fn refused(model: &GraspModel) -> String {
+        GraspModel::from_bytes(&model.to_bytes().unwrap(), &Device::flex()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_cut_out_larger_than_its_marks_is_refused() {
+        let mut forged = untaught(ModelKind::S);
+        forged.demonstrations[0].cutout = RgbImage::new(400, 400);
+        let refused = refused(&forged);
+        assert!(refused.contains("of at most 38976 pixels, according to its marks, found 400 × 400"), "{refused}");
+    }
+
+    #[test]
+    fn more_demonstrations_than_a_model_holds_are_refused() {
+        let mut forged = untaught(ModelKind::S);
+        forged.demonstrations = vec![forged.demonstrations[0].clone(); MAX_DEMONSTRATIONS + 1];
+        assert!(refused(&forged).contains("at most 100 demonstrations, found 101"), "{}", refused(&forged));
+        forged.demonstrations.pop();
+        assert!(GraspModel::from_bytes(&forged.to_bytes().unwrap(), &Device::flex()).is_ok());
+    }
+
+    #[test]
+    fn an_outline_of_a_file_is_thinned() {
+        let mut forged = untaught(ModelKind::S);
+        let corners = forged.demonstrations[0].marks.outline.clone().unwrap().vertices;
+        let along = |i: usize, k: usize| corners[i] + (corners[(i + 1) % 4] - corners[i]) * (k as f64 / 5000.0);
+        let vertices = (0..20_000).map(|n| along(n / 5000, n % 5000)).collect();
+        forged.demonstrations[0].marks.outline = Some(Polygon { vertices });
+        let read = GraspModel::from_bytes(&forged.to_bytes().unwrap(), &Device::flex()).unwrap();
+        let outline = read.demonstrations[0].marks.outline.as_ref().unwrap();
+        assert_eq!((outline.vertices.len(), outline.bounds()), (256, forged.demonstrations[0].marks.bbox));
     }
 
     #[test]

@@ -113,9 +113,10 @@ impl OrientationConfig {
         )?;
         let channels = &self.stage_channels;
         check_setting(
-            self.norm_groups > 0 && channels.iter().all(|c| *c > 0 && c.is_multiple_of(self.norm_groups)),
+            self.norm_groups > 0
+                && channels.iter().all(|c| (1..=1024).contains(c) && c.is_multiple_of(self.norm_groups)),
             "norm_groups",
-            &format!("a number that divides the stages' channels {channels:?}"),
+            &format!("a number that divides the stages' channels {channels:?}, which are 1 to 1024"),
             self.norm_groups,
         )?;
         check_setting((1..=8192).contains(&self.hidden), "hidden", "1 to 8192", self.hidden)?;

@@ -91,7 +91,7 @@ fn argmax(values: &[f32]) -> usize {
 /// Mean cell centre (column, row), weighted by the softmax of the cells around `best`.
 fn local_mean(logits: &[f32], size: usize, best: usize, radius: usize) -> (f32, f32) {
     let (best_row, best_column) = (best / size, best % size);
-    let span = |center: usize| center.saturating_sub(radius)..(center + radius + 1).min(size);
+    let span = |center: usize| center.saturating_sub(radius)..center.saturating_add(radius).saturating_add(1).min(size);
     let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
     for row in span(best_row) {
         for column in span(best_column) {

@@ -42,6 +42,7 @@ use sdg_geometry::GraspLine;
 use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, ValidationRecord, first_windows, train};
 
+use crate::cutout_budget::{CutoutBudget, MIN_PART_PX, check_count};
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
@@ -132,16 +133,10 @@ pub fn check_teaching_region(demonstrations: &[Demonstration], options: &TeachOp
     }
 }
 
-/// Minimum extent of a part in its photo: everything with two edges resembles a smaller part. Chosen by hand, not
-/// measured.
-const MIN_PART_PX: f64 = 20.0;
-
 /// Checks the marks: every model needs the grasp line and enough pixels of the part, and model D also an outline.
 /// Several demonstrations must agree.
 fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
-    if demonstrations.is_empty() {
-        return Err(GraspError::NoDemonstration);
-    }
+    check_count(demonstrations.len())?;
     for Demonstration { annotation, .. } in demonstrations {
         annotation.require_grasp()?;
         let (width, height) = (annotation.bbox.width(), annotation.bbox.height());
@@ -189,8 +184,10 @@ pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;
 
 /// The demonstrations as stored in the model.
 fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<TaughtDemonstration>> {
+    let mut budget = CutoutBudget::default();
     let with_tolerance = |demonstration| {
         let taught = TaughtDemonstration::new(demonstration)?;
+        budget.take(&taught.cutout)?;
         let mut check = taught.check().clone();
         check.search.scales = options.size_tolerance.clone();
         if check == *taught.check() { Ok(taught) } else { taught.with_check(check) }
