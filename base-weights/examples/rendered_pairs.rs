@@ -45,8 +45,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The set's part with its pictures, as the fit reads it, and the kind of each picture. `None` without exact ground
-/// truth (`truth.json`).
+/// The set's part with its pictures, in the form that the fit reads, and the kind of each picture. `None` without exact
+/// ground truth (`truth.json`).
 ///
 /// # Errors
 /// A picture that cannot be read.

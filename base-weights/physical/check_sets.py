@@ -1,7 +1,8 @@
 """Checks rendered sets. Usage: check_sets.py SETS_DIR [--sheets DIR]
 
 Every picture of truth.json exists and can be read, instances lie inside the picture unless optional, the outline of
-demo.json is valid, and enough look-alikes are mirrored. A sheet shows a set's pictures with their ground truth.
+demo.json is valid, and enough look-alikes of chiral parts are mirrored. A sheet shows a set's pictures with their
+ground truth.
 """
 
 import argparse

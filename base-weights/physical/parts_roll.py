@@ -1,5 +1,5 @@
-"""Parts of revolution, the group `roll`: they rest on the table at any angle about their axis. Choices of the program may
-depend on them.
+"""Parts of revolution, the group `roll`: they rest on the table at any angle about their axis. Constants and methods of
+the program may be chosen by their results.
 
 A part consists of sections along x, each with a radius as a function of the position along the axis and the
 angle about it, which gives threads their helix and heads their hexagon. The axis is y = z = 0.

@@ -1,4 +1,4 @@
-"""Parts of the group `tune`: choices of the program may depend on them."""
+"""Parts of the group `tune`: constants and methods of the program may be chosen by their results."""
 
 import drawings_tune as d
 from drawing import moved, part, ring_of, without

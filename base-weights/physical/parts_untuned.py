@@ -1,4 +1,4 @@
-"""Parts of the group `untuned`, which are only reported: no choice depends on them."""
+"""Parts of the group `untuned`: their results are only reported; no constant or method is chosen by them."""
 
 import drawings_untuned as d
 from drawing import moved, part, ring_of, without

@@ -18,7 +18,7 @@ import numpy
 
 
 def homography(width, height, lens, tilt, azimuth):
-    """From level to slanted positions, in pixels."""
+    """Maps positions in the level picture to positions in the slanted one, in pixels."""
     focal = 0.5 * max(width, height) / math.tan(lens / 2)
     c, s = math.cos(azimuth), math.sin(azimuth)
     along = numpy.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])

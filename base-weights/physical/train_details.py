@@ -27,12 +27,12 @@ from details_net import Siam
 from details_pairs import Pairs
 
 CELLS_LOSS = 0.5  # weight of the cells' loss
-DIFFERENT_WEIGHT = 4.0  # of cells that differ, which are few
+DIFFERENT_WEIGHT = 4.0  # weight of cells that differ, which are few
 WEIGHT_DECAY = 0.02
-MAX_NORM = 5.0  # of the gradient
+MAX_NORM = 5.0  # maximum norm of the gradient
 WARM_UP_STEPS = 300
 MIN_LR = 1e-5
-MEAN_DECAY = 0.998  # of the mean weights, per step
+MEAN_DECAY = 0.998  # decay of the mean weights, per step
 REPORT_SECS = 25
 CPU_OR_CUDA = "cuda" if torch.cuda.is_available() else "cpu"
 

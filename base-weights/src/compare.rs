@@ -20,8 +20,8 @@ use sdg_part_generator::{LookAlike, OtherKind, Part, PhotoConfig, Sample, SceneC
 use crate::outcome::{Outcome, outcomes};
 use crate::pictures::FIRST_PART_SEED;
 
-/// Maximum error of a correct detection. It corresponds to 10 mm at the paper's camera, which has 0.92 px per
-/// millimetre at a width of 640 px; the pictures of this comparison are 320 px wide.
+/// Maximum error of a correct detection. It corresponds to 10 mm at the camera of the paper SingleDemoGrasp, which has
+/// 0.92 px per millimetre at a width of 640 px; the pictures of this comparison are 320 px wide.
 const MAX_ERROR_PX: f64 = 4.6;
 /// Maximum angle error of a correct detection.
 const MAX_ERROR_DEGREES: f64 = 10.0;

@@ -42,7 +42,7 @@ impl Settings {
 
 /// The network and losses of a pretraining run.
 pub trait Task: Sized {
-    /// The module that is pretrained, all of whose parameters the optimiser updates.
+    /// The module that is pretrained; the optimiser updates all its parameters.
     type Network: Module + Clone;
 
     /// Initialises the network at random, on a device with autodiff.

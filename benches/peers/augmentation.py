@@ -1,4 +1,5 @@
-"""The paper's augmentation with albumentations: rotation, tint, shift, scale; box and keypoints are transformed too."""
+"""The augmentation of the paper SingleDemoGrasp with albumentations: rotation, tint, shift, scale, also of box and
+keypoints."""
 
 from concurrent.futures import ThreadPoolExecutor
 

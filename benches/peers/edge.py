@@ -22,7 +22,8 @@ from r50 import gflop_of
 WIDTH, HEIGHT, DIVISIBILITY = 320, 240, 32
 BATCH = 4
 NUM_KEYPOINTS = 12
-# Six parts per picture, more than the two that go through the keypoint head, so that its work is the same on both sides.
+# Six parts per picture, more than the two that go through the keypoint head, so that the head's work is the same on
+# both sides.
 GRID = (3, 2)
 SIZES, RATIOS, STRIDES = (24, 40, 70, 120, 200), (0.5, 1.0, 2.0), (4, 8, 16, 32, 64)
 BETA = 1 / 9

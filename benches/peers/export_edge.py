@@ -39,7 +39,7 @@ def main():
     # Traced on noise, because on an empty picture nothing is found and the following steps would not be traced.
     example.normal_(generator=torch.Generator().manual_seed(1))
     with torch.no_grad():
-        # The exporter that traces; the newer one rejects a number of boxes that is known only at run time.
+        # This exporter traces the model; the newer one rejects a number of boxes that is known only at run time.
         torch.onnx.export(
             detector.eval(),
             (example,),

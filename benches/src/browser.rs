@@ -49,7 +49,7 @@ pub struct BrowserArgs {
     results: Option<PathBuf>,
 }
 
-/// Copies the files, runs the page and prints the table; fails if a promise is broken.
+/// Copies the files, runs the page and prints the table; fails if the sides differ or our frame rate is too low.
 pub fn run(args: &BrowserArgs) -> Result<()> {
     let folder = args.root.join("target/bench/browser");
     let model = args.model.clone().unwrap_or_else(|| args.root.join("target/bench/pendulum.sdg"));
@@ -128,7 +128,7 @@ fn network_input(picture: &Path) -> Result<Vec<u8>> {
 }
 
 /// Checks that both sides found the same box and the same scores of the part and of its keypoints. The positions of the
-/// keypoints are not compared, because ours are a fit to the network's, as the grasp uses them.
+/// keypoints are not compared, because our positions are a fit to the network's positions, made for the grasp.
 fn check_same(measured: &Value) -> Result<()> {
     let ours = &measured["network"]["detections"][0];
     let theirs = &measured["theirs"];

@@ -1,8 +1,8 @@
 //! `sdg-bench edge`: measures the program for small machines under the conditions of such a machine.
 //!
 //! One core, a memory limit, one image from the start of the process to its end; then a sequence of images for the
-//! frames per second. Each figure except the frames per second has a bound that we promise, and the run fails if a
-//! bound is broken.
+//! frames per second. Each figure except the frames per second and the time of teaching has a bound that we promise,
+//! and the run fails if a bound is broken.
 
 use std::fmt::Write as _;
 use std::io::{Read, Seek};

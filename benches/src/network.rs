@@ -13,8 +13,8 @@ use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
 /// Number of keypoints of a part for R50: COCO's number.
 pub const NUM_KEYPOINTS: usize = 17;
-/// Number of positive ROIs per image in training, of 512. It equals the number of parts in the picture. Their
-/// ground-truth boxes are among the candidates, so the number is reached with any weights.
+/// Number of positive ROIs among the 512 ROIs per image in training. It equals the number of parts in the picture.
+/// Their ground-truth boxes are among the candidates, so the number is reached with any weights.
 pub const POSITIVE_ROIS: usize = 32;
 
 /// The networks that both sides build.

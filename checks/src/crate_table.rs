@@ -5,7 +5,7 @@
 pub struct CrateRow {
     /// The crate's name without the prefix `sdg-`.
     pub name: String,
-    /// The names in code in the last column.
+    /// The names between backticks in the last column.
     pub sees: Vec<String>,
 }
 

@@ -31,7 +31,7 @@ impl History {
 
     /// A file of `paths` that computes something else now than at `commit`; `None` if there is none. Rust sources are
     /// compared by their [`Statements`], all of them together; tests, examples and documents are left out, and any
-    /// other file differs if a byte of it does.
+    /// other file counts as changed if a byte of it differs.
     ///
     /// # Errors
     /// Git does not know the commit or fails.

@@ -30,7 +30,7 @@ pub fn headings(document: &str) -> Vec<String> {
 }
 
 /// Words of a document that begin with one of `folders` and a slash: paths from the repository's root. Paths with a
-/// placeholder (`*`, `…`, `<`) are left out.
+/// placeholder (`*`, `…`, `<`, `$`, `{`) are left out.
 pub fn named_files(document: &str, folders: &[&str]) -> Vec<String> {
     let is_end = |c: char| c.is_whitespace() || matches!(c, '`' | '(' | ')' | '[' | ']' | '|' | '"' | ',' | ';');
     let words = document.split(is_end).map(|word| word.trim_end_matches(['.', ':', '/']));

@@ -87,8 +87,8 @@ fn fault(table: &Table, measurement: &Measurement, age: &Age) -> Option<String> 
     }
 }
 
-/// For each mention of a commit in a text: the text after it, up to the next commit. Commits with nothing but "and" or
-/// a comma between them have the same note.
+/// For each mention of a commit in a text: the text after it, up to the next commit. Commits with nothing but "and", a
+/// comma or a bracket between them have the same note.
 fn notes_on<'a>(text: &'a str, commit: &str) -> Vec<&'a str> {
     let hashes = hashes(text);
     let mut notes = Vec::new();

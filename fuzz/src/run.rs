@@ -10,12 +10,12 @@ use peak_alloc::PeakAlloc;
 use crate::mutator::mutated;
 use crate::target::{MAX_BYTES_PER_INPUT_BYTE, MAX_SECONDS, Target};
 
-/// A broken promise of an execution.
+/// An execution that panicked, or took too much time or memory.
 #[derive(Debug, Clone)]
 pub struct Failure {
     /// Number of the execution.
     pub number: u64,
-    /// The promise and the observation, in words.
+    /// The panic, or the limit and the observed value.
     pub reason: String,
     /// The input.
     pub input: Vec<u8>,
@@ -32,7 +32,7 @@ pub struct Outcome {
     pub slowest_secs: f64,
     /// Most memory that an execution took, in bytes.
     pub most_bytes: usize,
-    /// The executions that broke a promise.
+    /// The executions that failed.
     pub failures: Vec<Failure>,
 }
 
@@ -45,7 +45,7 @@ pub struct Execution {
     pub seconds: f64,
     /// Most memory in use, beyond the memory in use before, in bytes.
     pub bytes: usize,
-    /// The broken promise, if any: its limit and the observation.
+    /// The reason of a failure, if any: the panic, or the limit and the observed value.
     pub broken: Option<String>,
 }
 

@@ -1,16 +1,15 @@
-//! A reader under attack.
+//! A reader that is tested with hostile input.
 
 /// Maximum time of an execution.
 pub const MAX_SECONDS: f64 = 10.0;
 /// Maximum memory per byte of input; parsed JSON values take more than their text.
 pub const MAX_BYTES_PER_INPUT_BYTE: usize = 20;
 
-/// A reader under attack.
+/// A reader that is tested with hostile input.
 pub struct Target {
     /// Name on the command line and in file names.
     pub name: &'static str,
-    /// Bytes that may be in use while it reads, beyond [`MAX_BYTES_PER_INPUT_BYTE`] times the size of
-    /// the input.
+    /// Bytes of memory that the reader may use, beyond [`MAX_BYTES_PER_INPUT_BYTE`] times the size of the input.
     pub max_extra_bytes: usize,
     /// Number of executions in the short run that is part of the tests; they take about a second.
     pub quick_executions: u64,

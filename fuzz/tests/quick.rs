@@ -45,8 +45,8 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
     // No mistake produces these pickles, which repeat one operation for a million bytes.
     let checkpoint = TARGETS.iter().find(|target| target.name == "checkpoint").unwrap();
     for (k, pickle) in costliest_pickles().iter().enumerate() {
-        // The program reads the file from the disk, so the limit is 3 instead of
-        // [`sdg_fuzz::MAX_BYTES_PER_INPUT_BYTE`] bytes per byte of the file.
+        // The program does not keep the file in memory, so the limit is 3 bytes per byte of the file instead of
+        // [`sdg_fuzz::MAX_BYTES_PER_INPUT_BYTE`].
         let execution = execute(checkpoint, pickle, &ALLOCATOR);
         let most = checkpoint.max_extra_bytes + 3 * pickle.len();
         if execution.broken.is_some() || execution.bytes > most {

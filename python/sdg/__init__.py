@@ -222,7 +222,8 @@ class Tracker:
 def read_picture(path: _Path, camera: Optional[Camera] = None) -> _Array:
     """Reads PNG, JPEG, WebP, BMP or TIFF like the program: uint8 of shape (height, width, 3), red first.
 
-    camera: the calibrated camera that took the picture, which keeps the sensor's orientation; None: upright (Exif).
+    camera: the calibrated camera that took the picture. With a camera, the sensor's orientation is kept; with None, the
+    picture is upright (Exif).
 
     Raises FileError and PictureError.
     """
@@ -250,18 +251,15 @@ def teach(
 ) -> GraspModel:
     """Teaches a model from one photo or several, with the defaults of `sdg teach`. Ctrl-C ends the teaching.
 
-    photo: the file of the photo.
-    marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file as a dictionary.
-    model: S, which takes seconds, or A, B, C or D, which have a network and take about a minute.
-    steps, time_budget_s: maximum steps and seconds of the network's training.
-    symmetry: number of angles at which the part looks the same, or "full".
-    size_tolerance: minimum and maximum size of the part in a picture, relative to its size in the photo.
-    region: (left, upper, width, height) in pixels of the photo.
-    camera: the file of the calibrated camera that took the photo, for grasps in metres.
-    mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a camera; grasp_height_mm defaults
-    to half of mark_height_mm.
-    negatives: files of pictures without the part.
-    more_demos: further photos of the part, each with its marks, like photo and marks.
+    photo: the file of the photo. marks: a file of marks (COCO, LabelMe, YOLO-pose), or the contents of such a JSON file
+    as a dictionary. model: S, which takes seconds, or A, B, C or D, which have a network and take half a minute or
+    more. steps, time_budget_s: maximum steps and seconds of the network's training. symmetry: number of angles at which
+    the part looks the same, or "full". size_tolerance: minimum and maximum size of the part in a picture, relative to
+    its size in the photo. region: (left, upper, width, height) in pixels of the photo. camera: the file of the
+    calibrated camera that took the photo, for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks
+    and of the grasp above the table, with a camera; grasp_height_mm defaults to half of mark_height_mm. negatives:
+    files of pictures without the part. more_demos: further photos of the part, each with its marks, like photo and
+    marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """

@@ -1,8 +1,8 @@
 //! Fails if a network learns badly: tests model C's network alone, taught from one photo of a generated part, on
 //! generated pictures with and without the part.
 //!
-//! The check against the demonstration would hide weaknesses of the network, so it is off. The part is not a shipped
-//! one, and its pictures are not rendered by the program that renders the network's training samples.
+//! Verification would hide weaknesses of the network, so it is off. The part is not a shipped one, and its pictures are
+//! not rendered by the program that renders the network's training samples.
 
 use std::ops::ControlFlow;
 

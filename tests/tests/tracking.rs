@@ -15,8 +15,8 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
 use sdg_simulation::views::demonstration_view;
 
-/// Number of frames that a search takes: 100 to 200 ms on one of two cores that other processes also use
-/// (docs/tracking.md).
+/// Number of frames after which a search's result is used: 200 ms. A search takes 100 to 200 ms on one of two cores
+/// that other processes also use.
 const SEARCH_FRAMES: u32 = 20;
 /// The promised accuracy: 95 % of the frames within these errors.
 const MAX_ERROR_PX: f64 = 2.0;

@@ -216,7 +216,8 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// A small file must not give a large result by many names for the same bytes; a few layers may use the same bytes.
+    /// Rejects tensors that together are more than twice as large as the file. A few layers may use the same bytes, but
+    /// many names for the same bytes would give a large result from a small file.
     fn check_total(&self, file_len: u64) -> Result<()> {
         let bytes = |tensor: &StoredTensor| (tensor.len() as u64).saturating_mul(tensor.element().size() as u64);
         let total = self.tensors.values().map(bytes).fold(0, u64::saturating_add);

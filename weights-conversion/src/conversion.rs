@@ -186,7 +186,7 @@ pub fn is_backbone_alone(checkpoint: &Checkpoint, naming: Naming) -> bool {
     naming.is_backbone_alone() || (naming == Naming::Ours && all_in_backbone())
 }
 
-/// The parts that a user may name: the first two words of each parameter.
+/// Examples of parts that a user may name: the first two words of each parameter's name.
 fn parts_of(expected: &BTreeMap<String, Vec<usize>>) -> Vec<String> {
     let parts: BTreeSet<String> =
         expected.keys().map(|name| name.split('.').take(2).collect::<Vec<_>>().join(".")).collect();

@@ -121,7 +121,7 @@ fn resnet_part(name: &str) -> bool {
 /// A number up to the next dot, and the text after the dot.
 fn number_and_rest(text: &str) -> Option<(usize, &str)> {
     let (number, rest) = text.split_once('.')?;
-    // Three digits: more layers than any network has, without overflow.
+    // At most three digits, which suffice for any network and cannot overflow.
     let valid = number.len() <= 3 && number.bytes().all(|byte| byte.is_ascii_digit());
     Some((number.parse().ok().filter(|_| valid)?, rest))
 }

@@ -62,11 +62,12 @@ fn licence_note(naming: Naming) -> &'static str {
 }
 
 impl Conversion {
-    /// Writes the parameters to `out`; `extra` is added to the metadata. The input is hashed at the same time.
+    /// Writes the parameters to the second of `paths`; `extra` is added to the metadata. The first path is the
+    /// checkpoint's file, which is hashed at the same time.
     ///
     /// # Errors
     /// The errors of [`Self::complete`]; values that are not finite, or too large for the precision; a truncated
-    /// checkpoint; a folder that cannot be written. An existing file `out` is then unchanged.
+    /// checkpoint; a folder that cannot be written. An existing file at the second path is then unchanged.
     pub fn write(
         &self,
         checkpoint: &Checkpoint,
@@ -123,8 +124,8 @@ impl Conversion {
         metadata
     }
 
-    /// Parameters in the order of the file: wider elements first, as in the reference implementation, so that all are
-    /// aligned.
+    /// Parameters in the order of the file: wider elements first, as in safetensors' reference implementation, so that
+    /// all are aligned.
     fn in_file_order(&self, precision: Precision) -> impl Iterator<Item = (&String, &Planned, Precision)> {
         let all = move |wanted| {
             self.parameters.iter().filter_map(move |(name, planned)| {

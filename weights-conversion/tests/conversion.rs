@@ -111,7 +111,7 @@ fn half_precision_rounds_kernels_and_leaves_vectors() {
     for applied in &conversion.report().applied {
         let exact = checkpoint.tensors[&applied.from].values(&mut source).unwrap();
         let rounded = half.tensors[&applied.name].values(&mut half_source).unwrap();
-        // Half precision has 11 binary digits, and 2⁻²⁴ is its smallest number.
+        // Half precision has 11 binary digits, and 2⁻²⁴ is its smallest positive number.
         let tolerance = |value: f32| if applied.shape.len() < 2 { 0.0 } else { value.abs() / 2048.0 + 3e-8 };
         assert!(exact.iter().zip(&rounded).all(|(e, r)| (e - r).abs() <= tolerance(*e)), "{}", applied.name);
     }
@@ -182,7 +182,7 @@ fn write_tensors(path: &Path, tensors: &BTreeMap<String, (Vec<usize>, Vec<f32>)>
 fn torchvision_s_background_moves_behind_the_classes() {
     let folder = tempfile::tempdir().unwrap();
     let [from, out] = ["torchvision.safetensors", "out.safetensors"].map(|name| folder.path().join(name));
-    // Two classes and the background: rows of the predictors contain their class.
+    // Two classes and the background: each row of the predictors contains the index of its class.
     let classes = |rows_a_class: usize, width: usize| -> (Vec<usize>, Vec<f32>) {
         let rows = 3 * rows_a_class;
         let values = (0..rows * width).map(|i| (i / width / rows_a_class) as f32).collect();

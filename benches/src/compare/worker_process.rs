@@ -13,8 +13,8 @@ use crate::compare::prepare::{Files, Paths};
 use crate::protocol::{Answer, Ready, Request};
 use crate::registry::{Side, WorkSpec};
 
-/// Pause before each series of runs, in which the other side's threads become idle; some of them spin for a while
-/// after their work.
+/// Pause before each series of runs. During the pause, the other side's threads become idle; some of them spin for a
+/// while after their work.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.

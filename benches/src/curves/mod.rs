@@ -3,8 +3,8 @@
 //! ```text
 //! shipped photo ─ the part drawn on its table, rotated ─ pictures that differ in one number ─ median time ─ table, exponents
 //! ```
-//! With an exponent of 1, the time is proportional to the number. The exponent of a curve comes from its first and last
-//! row.
+//! With an exponent of 1, the time is proportional to the varied number. The exponent of a curve comes from its first
+//! and last row.
 
 mod table;
 

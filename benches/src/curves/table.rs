@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 
-/// Times at one value of the number.
+/// Times at one value of the varied number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub number: f64,

@@ -19,7 +19,7 @@ pub fn counted(tested: &[Tested], min_score: f64) -> Counted {
 }
 
 /// The threshold with the largest number of found parts minus wrong detections and false alarms, and the counts at it;
-/// of equal thresholds, the highest.
+/// of equally good thresholds, the highest.
 pub fn best_for(tested: &[Tested]) -> (f64, Counted) {
     const STEPS: u32 = 100;
     let scores = tested.iter().flat_map(|tested| &tested.detections).map(|detection| detection.score);

@@ -8,7 +8,7 @@
 //! ```
 //! All sides process a picture before the next one, starting with another side each time. Our side accepts detections
 //! from a score of 0.5. The peers have no such threshold. Each peer gets the threshold with the largest number of found
-//! parts minus wrong detections and false alarms on the same set; a user cannot know it beforehand.
+//! parts minus wrong detections and false alarms on the same set; a user cannot know this threshold beforehand.
 
 mod counts;
 mod peer;

@@ -1,4 +1,4 @@
-//! The paper's augmentation: samples of one photo, with their boxes and keypoints.
+//! The augmentation of the paper SingleDemoGrasp: samples of one photo, with their boxes and keypoints.
 
 use std::path::Path;
 

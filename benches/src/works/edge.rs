@@ -16,8 +16,8 @@ use crate::scene;
 use crate::works::facts::{facts, mean};
 use crate::works::r50::sampled;
 
-/// Columns and rows of parts in a picture: more parts than go through the keypoint head, so that its
-/// work is the same on both sides.
+/// Columns and rows of parts in a picture: more parts than go through the keypoint head, so that the head's work is the
+/// same on both sides.
 const GRID: (u32, u32) = (3, 2);
 const BATCH: u32 = 4;
 /// So low that the weights hardly change and the hundredth step does the same work as the first.

@@ -1,4 +1,4 @@
-//! Works from a demonstration to a validated model, and with that model.
+//! The work that teaches a validated model from a demonstration, and the work that detects with this model.
 
 use std::ops::ControlFlow;
 use std::path::Path;

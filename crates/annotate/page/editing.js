@@ -50,7 +50,7 @@ export async function save(target) {
   if (target.saving) return;
   target.saving = true;
   let sent = 0;
-  // A photo that a restarted server does not have has no number to be saved under.
+  // A photo that is missing on a restarted server has no number under which its marks could be saved.
   while (sent !== target.revision && !target.isGone) {
     if (isLost()) {
       target.saved = { state: "refused", why: "sdg annotate does not answer; the marks are kept in this browser", lost: true };
@@ -146,7 +146,7 @@ export function strokeOutline(points, isInside) {
   return proposeOutline({ isStroke: true });
 }
 
-/** Maximum margin of a person's box around the outline, as a share of its side; a looser box is fitted to a corrected outline. */
+/** Maximum margin of a person's box around the outline, as a share of the box's longer side; a looser box is fitted to a corrected outline. */
 const LOOSE = 0.06;
 
 /** If a stroke leaves less of the outline than this share, a note is shown. */
@@ -191,7 +191,7 @@ export function proposeOutline(options = {}) {
 async function detectOutline(target, { quietly = false, isStroke = false }) {
   const { base, strokes: earlier, box: drawn } = isStroke ? howFound(target) : { base: null, strokes: [], box: null };
   const added = isStroke ? [...target.waiting] : [];
-  // All waiting strokes were answered together, or taken back.
+  // No stroke waits any more: all were answered together, or taken back.
   if (isStroke && !added.length) return;
   const strokes = [...earlier, ...added];
   // Strokes are applied within the box that was drawn, even after the box was fitted to the outline.
@@ -206,7 +206,7 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
   try {
     const said = strokes.map(({ points, isInside }) => ({ points, is_inside: isInside }));
     const { outline } = await api.proposeOutline(target.id, box, said, base);
-    // Marks changed in the meantime take precedence, and strokes taken back do not count.
+    // An outline made in the meantime takes precedence over one that the user did not ask for, and strokes taken back do not count.
     const waited = target === image() && !(quietly && target.marks.outline) && added.every((stroke) => target.waiting.includes(stroke));
     if (waited && !outline) {
       if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");

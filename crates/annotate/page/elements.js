@@ -9,6 +9,17 @@ export function button(text, action, classes = "") {
   return made;
 }
 
+/** Changes a value in the browser's storage (null: removes it) and returns it; null if the browser refuses storage. */
+export function stored(key, value) {
+  try {
+    if (value === null) localStorage.removeItem(key);
+    else if (value !== undefined) localStorage.setItem(key, value);
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  }
+}
+
 const titles = new WeakMap();
 
 /** Disables a control and puts the reason into its title; enables it if there is no reason. */

@@ -13,7 +13,7 @@ const dialog = by("folder");
 /** Role of a chosen picture: photo or try. */
 let wanted = "photo";
 
-/** The pictures offered for a role, by name. A removed demonstration may be a copy of a picture to try. */
+/** The pictures offered for a role, by name. A removed demonstration may be a copy of a picture to try; it is then not offered for trying. */
 const offered = (role) => state.others.filter(({ is_tried: isTried }) => role === "photo" || !isTried).sort(byName);
 
 const isWithoutPhoto = () => !state.images.length && !state.camera;

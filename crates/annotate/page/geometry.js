@@ -93,15 +93,15 @@ export function reach({ center, angle, length }, part) {
 /** Angles tried when a gripper is placed: five degrees apart; then those around the best one, half a degree apart. */
 const TURNS = Array.from({ length: 36 }, (_, i) => (i * Math.PI) / 36 - Math.PI / 2);
 const FINE_TURNS = Array.from({ length: 21 }, (_, i) => ((i - 10) * Math.PI) / 360);
-/** Clearance between jaw and part of a placed gripper, as a share of the part's width, and its minimum in pixels. */
+/** Clearance of a placed gripper: that of both jaws together as a share of the part's width, and the minimum of each jaw in pixels. */
 const ROOM = 0.08;
 const MIN_ROOM_PX = 2;
 
 export const withRoom = (width) => width + Math.max(2 * MIN_ROOM_PX, width * ROOM);
 
-/** Distances along the part, in its widths, at which its sides are examined; the largest at which they are still straight counts. */
+/** Lengths along the part, in its widths, over which its sides are examined; the largest over which they are straight counts. */
 const SIDE_LENGTHS = [4, 2.5, 1.5, 1];
-/** Maximum deviation of a straight side's points from a line, as a share of the part's width, and its minimum in pixels. */
+/** Maximum root mean square deviation of a straight side's points from a line, as a share of the part's width, and its minimum in pixels. */
 const STRAIGHT = 0.03;
 const MIN_STRAIGHT_PX = 0.7;
 /** Edges at a larger angle to the jaws' direction are ends of the part, not sides. */
@@ -127,7 +127,7 @@ function sidePoints({ center, angle, width }, part, half) {
   return sides;
 }
 
-/** The common slope of both sides, and the distance of their points from lines of that slope; null if a side is missing. */
+/** The common slope of both sides, and the distance of their points from lines of that slope; null if a side has too few points. */
 function commonSlope(sides, half) {
   if (sides.some((side) => side.length < Math.max(half, 3))) return null;
   const mean = (points, axis) => points.reduce((sum, p) => sum + p[axis], 0) / points.length;

@@ -18,7 +18,7 @@ const MAX_MS = 6000;
 
 const best = ({ detections }) => detections[0]?.score ?? 0;
 
-/** The candidates and other pictures; null if there are none, or not yet. */
+/** The candidates and other pictures; null if there are none, or if not all pictures are searched yet. */
 function question() {
   if (state.tab !== "try" || isLive() || !isQuick()) return null;
   const { trialPictures } = state;

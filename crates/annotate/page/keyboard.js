@@ -96,7 +96,7 @@ function focused() {
   return { kind: data.kind, edge: data.edge, end: data.end, jaw: data.jaw !== undefined, vertex };
 }
 
-// The focus on the photo is shown only to keyboard users: browsers do not distinguish these users in drawings.
+// The focus on the photo is shown only after a key press. Browsers do not do this by themselves for elements of SVG.
 document.addEventListener("keydown", () => document.documentElement.toggleAttribute("data-keys", true), true);
 document.addEventListener("pointerdown", () => document.documentElement.removeAttribute("data-keys"), true);
 

@@ -11,7 +11,7 @@ import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
 import { listText } from "./words.js";
 
-/** Interval between requests: more pictures per second than a person needs. */
+/** Interval between requests, short enough for smooth motion. */
 const PAUSE_MS = 60;
 /** Interval while the model is tried and waits for the camera's next frame; after a frame the next one is requested at once. */
 const TRYING_PAUSE_MS = 15;

@@ -2,7 +2,7 @@
 
 import { api, belongTo } from "./api.js";
 import { adopt } from "./editing.js";
-import { by } from "./elements.js";
+import { by, stored } from "./elements.js";
 import { openFolder, renderFolder } from "./folder.js";
 import "./gestures.js";
 import { renderLive } from "./live.js";
@@ -24,18 +24,18 @@ import { fitOrPart } from "./keyboard.js";
 import { renderView, zoom } from "./view.js";
 
 
-/** The theme is stored in the browser, if it allows that. */
+/** The theme is stored in the browser. */
 const THEMES = ["auto", "light", "dark"];
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   by("theme-name").textContent = theme;
-  localStorage.setItem("theme", theme);
+  stored("theme", theme);
 }
 by("theme").addEventListener("click", () => {
   const now = THEMES.indexOf(document.documentElement.dataset.theme);
   setTheme(THEMES[(now + 1) % THEMES.length]);
 });
-setTheme(THEMES.includes(localStorage.getItem("theme")) ? localStorage.getItem("theme") : "auto");
+setTheme(THEMES.includes(stored("theme")) ? stored("theme") : "auto");
 
 by("help-button").addEventListener("click", () => by("help").showModal());
 by("zoom-in").addEventListener("click", () => zoom(1.25));

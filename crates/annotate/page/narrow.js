@@ -7,7 +7,7 @@ const narrow = matchMedia("(max-width: 860px)");
 function place() {
   const [inOut, tabs, results] = ["in-out", "tabs", "results"].map(by);
   if (narrow.matches) {
-    // Above the photo: the panel is below it.
+    // Above the photo, because the panel is below the photo.
     by("zoom-tools").before(inOut);
     by("corner").after(tabs);
     // Directly below the pictures.

@@ -3,7 +3,7 @@
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, save } from "./editing.js";
-import { by } from "./elements.js";
+import { by, stored } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
@@ -21,7 +21,7 @@ const isUnsaved = (target) => target.saving || target.saved.lost || target.saved
 function keep() {
   const kept = {};
   for (const target of state.images.filter(isUnsaved)) kept[target.name] = { was: target.sent, marks: target.marks };
-  if (Object.keys(kept).length) localStorage.setItem(KEPT, JSON.stringify({ project: state.project, kept }));
+  if (Object.keys(kept).length) stored(KEPT, JSON.stringify({ project: state.project, kept }));
 }
 
 onLoss((lost) => {
@@ -91,8 +91,8 @@ async function meetAgain() {
 
 /** Sends the marks that were stored when the page was closed or reloaded without a server. */
 export async function sendKept(project) {
-  const text = localStorage.getItem(KEPT);
-  localStorage.removeItem(KEPT);
+  const text = stored(KEPT);
+  stored(KEPT, null);
   if (!text) return;
   const { project: of, kept } = JSON.parse(text);
   if (of !== project) return;
@@ -132,7 +132,7 @@ export async function beat() {
       keep();
       await meetAgain();
     } else {
-      if (!state.images.some(isUnsaved)) localStorage.removeItem(KEPT);
+      if (!state.images.some(isUnsaved)) stored(KEPT, null);
       state.images.filter(({ saved }) => saved.by_disk).forEach(save);
       if (!document.hidden) await api.teaching().catch(() => null);
     }

@@ -30,7 +30,7 @@ by("add-pictures").addEventListener("click", () => by("picture-input").click());
 by("add-folder").addEventListener("click", () => by("folder-input").click());
 for (const id of ["picture-input", "folder-input"]) {
   by(id).addEventListener("change", () => {
-    // A copy: clearing the field, so that the same files can be chosen again, clears its list.
+    // The list is copied, because it is cleared with the field. A cleared field accepts the same files again.
     const files = [...by(id).files];
     by(id).value = "";
     addPictures(files);

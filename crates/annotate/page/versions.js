@@ -23,7 +23,7 @@ function briefFigures({ figures }) {
   return `${found[0]} of ${found[1]} found, ${wrong} wrong, ${alarms[0]} of ${alarms[1]} false alarms`;
 }
 
-/** The finished model's results on held-back samples, in words. */
+/** The finished model's results on held-out samples, in words. */
 export function figuresText({ figures, negatives }) {
   if (!figures) return "";
   const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees, others_in_photo: others } = figures;

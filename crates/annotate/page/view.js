@@ -51,12 +51,12 @@ export function fit() {
   const { clientWidth, clientHeight } = stage;
   const scale = wholeScale();
   const [x, y] = [(clientWidth - shown[0] * scale) / 2, (clientHeight - shown[1] * scale) / 2];
-  // A hidden stage has no size: it is fitted as soon as it has one.
+  // A hidden stage has no size: the photo is fitted as soon as the stage has one.
   state.view = scale > 0 ? { scale, x, y, fitted: true } : { ...state.view, fitted: true };
   changed();
 }
 
-/** Shows a box of the photo with a margin of its size, or a narrow one if the box fills much of the photo. The scale is at least `least`, as far as the box then fits. */
+/** Shows a box of the photo so that it fills half of the view, or 80 % of it if the box fills much of the photo. The scale is at least `least`, unless the box would then fill more than 80 % of the view. */
 export function showBox(box, least = state.view.scale) {
   const [x1, y1, x2, y2] = box;
   const { clientWidth, clientHeight } = stage;

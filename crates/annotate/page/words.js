@@ -10,5 +10,5 @@ export function listText(words, most = Infinity) {
 }
 
 const collator = new Intl.Collator("en", { numeric: true });
-/** Orders files and pictures by name, and 2 before 10. */
+/** Orders files and pictures by name, numbers in names by value. */
 export const byName = (a, b) => collator.compare(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name);

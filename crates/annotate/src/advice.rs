@@ -18,8 +18,8 @@ const MIN_LINE_PX: f64 = 12.0;
 const MIN_PART_PX: f64 = 24.0;
 /// Tolerated extent of the part beyond a jaw: outlines are drawn by hand.
 const JAW_SLACK_PX: f64 = 1.5;
-/// Maximum ratio of the opening to the narrowest opening about its middle; above it the jaws are in the wrong
-/// direction.
+/// Maximum ratio of the required opening to the smallest opening that any direction about the gripper's middle
+/// requires. Above this ratio, the jaws are in the wrong direction.
 const MAX_OPENING: f64 = 2.0;
 /// Maximum clearance of the jaws as a share of the part's width; wider jaws were left open by mistake.
 const MAX_CLEARANCE: f64 = 1.0;

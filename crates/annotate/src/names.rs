@@ -14,7 +14,7 @@ pub fn natural_order(a: &str, b: &str) -> Ordering {
     pieces(a).cmp(pieces(b)).then_with(|| a.cmp(b))
 }
 
-/// A piece of a name, in the order of the kinds.
+/// A piece of a name. The order of the variants is the order of sorting.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Piece<'a> {
     Sign(char),

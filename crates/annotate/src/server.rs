@@ -34,8 +34,8 @@ use crate::session::Session;
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Maximum silence of a connection, in either direction, before it is closed.
 const MAX_WAIT: Duration = Duration::from_secs(30);
-/// Time for which the body of a rejected request is read and discarded: closing a connection with unread bytes resets
-/// it, and the response may be lost.
+/// Maximum time for which the body of a rejected request is read and discarded: closing a connection with unread bytes
+/// resets it, and the response may be lost.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Maximum size of a request's head; browsers send smaller ones.
 const MAX_HEAD_BYTES: usize = 16 << 10;

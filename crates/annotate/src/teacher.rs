@@ -231,7 +231,7 @@ pub struct Figures {
 pub struct NegativesRefused {
     /// Pictures in which nothing is accepted.
     pub refused: usize,
-    /// Number of these pictures.
+    /// Number of all pictures without the part.
     pub pictures: usize,
 }
 

@@ -71,7 +71,7 @@ pub struct News {
 struct Pace {
     /// Every `stride`-th point of the loss curve is kept.
     stride: usize,
-    /// Time at which its first step was reported, and the number of steps done then.
+    /// Time at which the network's first step was reported, and the number of steps done then.
     since_secs: f64,
     since_done: usize,
 }

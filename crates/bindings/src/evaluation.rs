@@ -38,7 +38,7 @@ pub fn evaluate(
             let file = picture.name();
             match Tested::detect(picture, &perception, verification) {
                 Ok(of_picture) => tested.push(of_picture),
-                // The model's region is for pictures of another size.
+                // The model's region does not fit a picture of this size.
                 Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
                     labelled.left_out.push(LeftOut { file, why: error.root_cause().to_string() });
                 }

@@ -41,7 +41,7 @@ pub enum FaultKind {
     Forked = 12,
 }
 
-/// An error with the program's text.
+/// An error with the text that `sdg` would print.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// The kind of error.

@@ -29,7 +29,7 @@ pub struct PixelShape {
 }
 
 impl PixelShape {
-    /// Checks an array's shape: (height, width, 3), or (height, width) for grey.
+    /// Checks an array's shape: (height, width, 3), or (height, width) or (height, width, 1) for grey.
     ///
     /// # Errors
     /// Another shape, no pixels, or more pixels than allowed in a picture's file.

@@ -37,7 +37,8 @@ pub struct Teaching {
 /// so its weights are rounded.
 ///
 /// # Errors
-/// Files cannot be read, photos or marks are unsuitable for teaching, or teaching was ended before there was a model.
+/// Files cannot be read, photos or marks are unsuitable for teaching, the region is empty, the process was forked from
+/// one with threads of this library, or teaching was ended before there was a model.
 pub fn teach(
     from: &Teaching,
     mut options: TeachOptions,

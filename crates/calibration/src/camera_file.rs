@@ -74,8 +74,8 @@ pub struct TablePose {
 /// Range of the camera's height above the table, in metres. Chosen by hand: no grasp was taught from a greater
 /// distance, and a height given in millimetres is out of range.
 const HEIGHTS_M: [f64; 2] = [0.05, 20.0];
-/// Largest horizontal distance of camera and workspace from the frame's origin, in metres: larger than robot cells, and
-/// smaller than positions given in millimetres.
+/// Largest absolute x and y of camera and workspace in the frame, in metres: larger than robot cells, and smaller than
+/// usual positions given in millimetres.
 const MAX_ASIDE_M: f64 = 50.0;
 /// Tolerance of a quaternion's length, for rounding in files.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
@@ -163,8 +163,8 @@ impl CalibratedCamera {
     /// Reads a camera file.
     ///
     /// # Errors
-    /// The file is not a `camera_info` with a `plumb_bob` lens, the lens folds the picture, or a pose or the workspace
-    /// is impossible.
+    /// The file is not a `camera_info` with a `plumb_bob` lens, the camera matrix is invalid, the lens folds the
+    /// picture, or a pose or the workspace is impossible.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
             // Only the first line: the further ones repeat the position in the file.
@@ -197,7 +197,7 @@ impl CalibratedCamera {
         }
     }
 
-    /// Whether both are equal except for rounding of the quaternions, which are normalised on reading.
+    /// Whether both are equal except for small differences of the poses, whose quaternions are normalised on reading.
     fn is_near(&self, other: &Self) -> bool {
         let poses =
             |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];

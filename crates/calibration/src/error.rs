@@ -99,7 +99,7 @@ pub enum CalibrationError {
     /// The file is not one of this crate's sheets.
     #[error("expected a board's file with the size of its squares, found a file without it")]
     NoBoardFile,
-    /// The picture has no grid of corners.
+    /// The picture has no grid with enough corners.
     #[error(
         "expected the board, found {}: it may be seen edge-on, cut off, covered, dark or out of focus",
         if *.corners == 0 { "no corners of squares in a grid".to_owned() } else { format!("at most {columns} x {rows} corners of squares in a grid") }

@@ -39,8 +39,8 @@ impl FocalSource {
     }
 }
 
-/// A camera without a file: the axis at the centre, no distortion, and a focal length from the best available source;
-/// `None` if that focal length is impossible.
+/// A camera without a file: the optical axis at the picture's centre, no distortion, and a focal length from the best
+/// available source; `None` if that focal length is impossible.
 pub fn guess_camera(
     size: (u32, u32),
     board: &Board,

@@ -1,4 +1,4 @@
-//! Least squares over shared parameters and six parameters of each picture (its pose).
+//! Least squares over shared parameters and six parameters of each picture, such as its pose.
 //!
 //! Legend: `s` the shared parameters, `o` the six of a picture; `A = Σ Jₛᵀ Jₛ`, `B = Jₛᵀ Jₒ`, `C = Jₒᵀ Jₒ`, and the
 //! gradients `g = Jᵀ r` of residuals `r` (computed minus measured). Pictures are coupled only by `s`, so their own

@@ -18,8 +18,8 @@ pub(crate) struct Projected {
     pub(crate) by_point: Matrix2x3<f64>,
 }
 
-/// Projects a point; `None` at or behind the camera. Beyond the radius at which the lens's polynomial decreases again,
-/// the polynomial is evaluated anyway: an optimiser must be able to return from there.
+/// Projects a point; `None` for a point at or behind the camera. Beyond the radius at which the lens's polynomial
+/// decreases again, the polynomial is evaluated anyway: an optimiser must be able to return from there.
 pub(crate) fn project(camera: &PinholeCamera, p: &Point3<f64>) -> Option<Projected> {
     if p.z <= f64::EPSILON {
         return None;

@@ -11,7 +11,7 @@ use crate::detection::SeenCorner;
 const STILL_SHARE: f64 = 0.002;
 /// Number of successive frames at rest that are required, so that no picture is blurred.
 const STILL_FRAMES: u32 = 4;
-/// A view is new if its corners are at least this far from those of every other view, as a fraction of the diagonal.
+/// A view is new if its corners are at least this far from those of every taken view, as a fraction of the diagonal.
 /// Chosen by hand: 48 pixels of 640 × 480.
 const NEW_PLACE_SHARE: f64 = 0.06;
 /// Like [`NEW_PLACE_SHARE`], for the corners relative to their centre: another tilt or size at the same place. Chosen
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use nalgebra::Point2;
 
-    /// Corners of a row, such as 0 to 11, starting at this position.
+    /// Corners of one row of the board, such as 0 to 11. Corner 0 is, or would be, at (x, y).
     fn row(x: f64, y: f64, corners: std::ops::Range<u32>) -> Vec<SeenCorner> {
         let corner = |k: u32| SeenCorner { corner: [k, 0], pixel: Point2::new(x + 20.0 * f64::from(k), y) };
         corners.map(corner).collect()
@@ -145,8 +145,8 @@ mod tests {
             (0..12).map(corner).collect()
         };
         taker.keep(sized(30.0));
-        // The corners are 0.5 to 5.5 steps from their centre, with a median of 3: 2 pixels per step change this by 6
-        // pixels, 4 by 12; 10 are required.
+        // The corners are 0.5 to 5.5 steps from their centre, with a median of 3. Steps that are longer by 2 pixels
+        // change this distance by 6 pixels, steps that are longer by 4 pixels by 12. A new view requires 10 pixels.
         assert_eq!(taker.look(&sized(32.0)), Sight::Known);
         assert_eq!(taker.look(&sized(34.0)), Sight::New);
     }

@@ -86,7 +86,7 @@ fn cameras_are_found_as_exactly_as_opencv_finds_them() {
     }
 }
 
-/// Writes the input of calibrate.py beside the build.
+/// Writes the input of calibrate.py into Cargo's folder for temporary files.
 #[test]
 #[ignore = "writes the pictures that OpenCV's figures are made from"]
 fn write_pictures() {
@@ -206,7 +206,7 @@ fn poses_all_alike_are_an_error_that_says_what_to_do() {
 #[test]
 fn what_the_pictures_lack_is_named() {
     let camera = CAMERAS[0].1;
-    // Never in the lower right, and tilted only sideways.
+    // The board is never in the lower right, and is tilted only sideways.
     let poses: Vec<_> = [[-0.3, 0.3], [0.0, 0.3], [0.3, -0.3], [0.1, 0.2], [-0.1, -0.3]]
         .iter()
         .map(|[_, tilt]| ([250.0, 180.0], 0.3, [0.0, *tilt, 0.05]))
@@ -216,7 +216,7 @@ fn what_the_pictures_lack_is_named() {
     assert_eq!(found.advice[0], Advice::OneAxis { missing: "upwards and downwards" });
     assert!(found.advice.contains(&Advice::Empty { part: "in the lower right corner" }));
     assert!(found.advice.contains(&Advice::Few { found: 5 }));
-    // Far from the camera.
+    // The board is far from the camera.
     let far: Vec<_> =
         poses.iter().map(|(_, _, tilts)| (Point2::new(320.0, 240.0).coords.into(), 0.9, *tilts)).collect();
     let found = calibrate(&board(), &views_at(&camera, &far), &config(&camera));

@@ -76,7 +76,7 @@ pub struct Playback {
 }
 
 impl Address {
-    /// Whether the source is live, unlike pictures in files and folders, which are never lost.
+    /// Whether the source is live. Pictures in files and folders are not.
     pub fn is_live(&self) -> bool {
         !matches!(self, Self::Folder { .. } | Self::File { .. })
     }

@@ -83,11 +83,11 @@ impl LatestFrame {
         Self { shared, thread: Some(thread) }
     }
 
-    /// The newest frame that was not taken yet; waits for it if there is none. Returns `None` after the timeout and at
+    /// The newest frame that was not taken yet; waits for one if there is none. Returns `None` after the timeout and at
     /// the camera's end ([`has_ended`](Self::has_ended)).
     ///
     /// # Errors
-    /// Each error of the camera, once, before later frames.
+    /// Each error of the camera, once, before the frame. Of more than 16 unread errors, the oldest are lost.
     pub fn take(&self, timeout: Duration) -> Result<Option<Frame>, CameraError> {
         let deadline = Instant::now() + timeout;
         let mut newest = self.shared.lock();
@@ -170,11 +170,11 @@ mod tests {
     }
 
     #[test]
-    fn of_many_unread_errors_the_newest_are_kept() {
+    fn of_many_unread_errors_a_limited_number_is_kept() {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();
         let latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
-        // Declared last: see below.
+        // Declared last, for the reason given in the next test.
         let send = send;
         for _ in 0..MAX_ERRORS + 5 {
             was_asked.recv().unwrap();

@@ -46,11 +46,11 @@ pub struct OpenOptions {
     pub exposure_secs: Option<f64>,
     /// Fixed white balance in kelvin; `None` for automatic white balance.
     pub white_balance_kelvin: Option<u32>,
-    /// Orientation of pictures with an Exif orientation. A calibration needs the sensor's.
+    /// Orientation of pictures with an Exif orientation. A calibration needs [`PixelFrame::Sensor`].
     pub frame: PixelFrame,
     /// Time without a frame after which a camera is [`Fault::Stale`](crate::Fault::Stale).
     pub stall_timeout: Duration,
-    /// Number of bit-identical frames in a row that is [`Fault::Frozen`](crate::Fault::Frozen).
+    /// Number of bit-identical frames in a row from which on a frame is [`Fault::Frozen`](crate::Fault::Frozen).
     pub frozen_frames: u32,
 }
 

@@ -22,7 +22,7 @@ const MAX_LINE_BYTES: u64 = 1 << 10;
 /// Time limit for a program to exit after it has closed its standard output.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A picture as received, still encoded; or text that describes invalid data.
+/// The time of arrival, and a picture, still encoded, or text that describes invalid data.
 type Arrived = (SystemTime, Result<Vec<u8>, String>);
 
 /// A running program. Pictures are taken in order without gaps: a program that is faster than its reader must wait.

@@ -30,7 +30,7 @@ const MAX_REQUEST_BYTES: usize = 16 << 10;
 const PAGE: &str = include_str!("page/index.html");
 const SCRIPT: &str = include_str!("page/page.js");
 
-/// A server on 127.0.0.1 that shows the published pictures to any number of browsers.
+/// A server on 127.0.0.1 that shows the published pictures to browsers, over at most 32 connections at a time.
 ///
 /// | path | answer |
 /// |---|---|
@@ -42,7 +42,8 @@ const SCRIPT: &str = include_str!("page/page.js");
 ///
 /// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser
 /// gets the newest picture when the browser is ready. Only requests to 127.0.0.1 or localhost with this port are
-/// answered, and no requests from other pages. Foreign host names that resolve to this address are therefore rejected.
+/// accepted, so foreign host names that resolve to this address are rejected. Requests from other pages are rejected,
+/// too.
 pub struct MjpegServer {
     shared: Arc<Shared>,
     port: u16,

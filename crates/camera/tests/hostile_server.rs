@@ -108,7 +108,7 @@ fn a_torn_picture_is_not_delivered_and_the_next_one_is() {
     let torn = [b"--cut\r\n\r\n".as_slice(), &picture[..picture.len() / 2], b"\r\n"].concat();
     let faults = faults_of(move |stream| {
         stream.write_all(&[torn.as_slice(), b"--cut\r\n"].concat()).unwrap();
-        // Of two available pictures, the older one is skipped.
+        // Of two available pictures, the client skips the older one. The pause lets it read the torn one first.
         sleep(Duration::from_millis(100));
         stream.write_all(&part(150, false)).unwrap();
         stream.write_all(b"--cut\r\n").unwrap();

@@ -110,7 +110,7 @@ typedef int32_t sdg_status;
 /* sdg_detection.turn_source: the mask's outline (model D). */
 #define SDG_TURN_OUTLINE 4u
 
-/* sdg_detection.turn_source: search over all angles (model S). */
+/* sdg_detection.turn_source: search over all angles (model S, and parts of other models that only the search found). */
 #define SDG_TURN_SEARCH 5u
 
 /* sdg_teaching.symmetry: the part looks the same at every angle. */
@@ -156,7 +156,8 @@ typedef struct {
     uint32_t region[4];
 } sdg_options;
 
-/* Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`. */
+/* Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`; photo
+ * and marks must be given. */
 typedef struct {
     /* SDG_ABI_VERSION. */
     uint32_t abi_version;
@@ -167,7 +168,7 @@ typedef struct {
     const char *photo;
     /* File of the marks, in LabelMe or COCO format. */
     const char *marks;
-    /* The model's letter: "S" takes seconds; NULL selects "C", whose network takes minutes. */
+    /* The model's letter: "S" takes seconds; NULL selects "C", whose network takes half a minute or more. */
     const char *model;
     /* File of the calibrated camera that took the photo, for poses in metres; NULL for none. */
     const char *camera;
@@ -249,7 +250,7 @@ typedef struct {
     uint32_t frame;
     /* 1 if it is accepted, 0 if it is refused. */
     uint32_t is_accepted;
-    /* SDG_TURN_CROP, ...: the initial source of the angle. */
+    /* SDG_TURN_CROP, ...: the source of the angle's first estimate. */
     uint32_t turn_source;
     /* Number of corners of the outline; see sdg_detections_polygon. */
     uint32_t num_polygon;

@@ -25,7 +25,7 @@ pub fn status(work: impl FnOnce() -> Result<()>) -> sdg_status {
             "an internal error of libsdg, described on standard error; please report it".to_owned(),
         ),
     };
-    // Has no effect in a thread that only runs its destructors.
+    // Has no effect in a thread that ends and already runs its destructors.
     _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
     status
 }
@@ -100,7 +100,7 @@ mod tests {
             let mut buffer = [c_char::MAX; 9];
             // SAFETY: the buffer has room for nine bytes.
             assert_eq!(unsafe { copy_text("aµb", buffer.as_mut_ptr(), room) }, 5);
-            // SAFETY: it ends with a zero byte, else `expected` would not be found.
+            // SAFETY: `copy_text` has written a zero byte.
             assert_eq!(unsafe { CStr::from_ptr(buffer.as_ptr()) }.to_str(), Ok(expected));
             assert!(buffer[room..].iter().all(|byte| *byte == c_char::MAX), "{room}");
         }

@@ -68,7 +68,7 @@ pub const SDG_TURN_KEYPOINTS: u32 = 2;
 pub const SDG_TURN_TEXTURE: u32 = 3;
 /// sdg_detection.turn_source: the mask's outline (model D).
 pub const SDG_TURN_OUTLINE: u32 = 4;
-/// sdg_detection.turn_source: search over all angles (model S).
+/// sdg_detection.turn_source: search over all angles (model S, and parts of other models that only the search found).
 pub const SDG_TURN_SEARCH: u32 = 5;
 
 /// sdg_teaching.symmetry: the part looks the same at every angle.
@@ -118,7 +118,8 @@ pub struct sdg_options {
     pub region: [u32; 4],
 }
 
-/// Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`.
+/// Inputs of a teaching run. Numbers that are 0 and pointers that are NULL select the defaults of `sdg teach`; photo
+/// and marks must be given.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sdg_teaching {
@@ -131,7 +132,7 @@ pub struct sdg_teaching {
     pub photo: *const c_char,
     /// File of the marks, in LabelMe or COCO format.
     pub marks: *const c_char,
-    /// The model's letter: "S" takes seconds; NULL selects "C", whose network takes minutes.
+    /// The model's letter: "S" takes seconds; NULL selects "C", whose network takes half a minute or more.
     pub model: *const c_char,
     /// File of the calibrated camera that took the photo, for poses in metres; NULL for none.
     pub camera: *const c_char,
@@ -217,7 +218,7 @@ pub struct sdg_detection {
     pub frame: u32,
     /// 1 if it is accepted, 0 if it is refused.
     pub is_accepted: u32,
-    /// SDG_TURN_CROP, ...: the initial source of the angle.
+    /// SDG_TURN_CROP, ...: the source of the angle's first estimate.
     pub turn_source: u32,
     /// Number of corners of the outline; see sdg_detections_polygon.
     pub num_polygon: u32,

@@ -9,8 +9,8 @@ use sdg_report::{Color, Pen, draw_box, draw_keypoints, draw_label, draw_polygon,
 /// Colour of the board in the frame.
 const BOARD: Color = Color([255, 196, 61]);
 
-/// Draws the board's corners, the views taken so far, the regions without views, and two texts in the lower left
-/// corner: the state, and below it the next view.
+/// Draws the board's corners, the views taken so far, the parts of the picture without views, and two texts in the
+/// lower left corner: the state, and below it the next view.
 pub fn draw_board_session(
     picture: &mut RgbImage,
     session: &BoardSession<'_>,

@@ -135,7 +135,7 @@ fn draw_legend(drawn: &mut RgbImage, lines: &[(&str, Color)], parts: &[BoundingB
         let place = |(row, (text, _)): (usize, &(&str, Color))| {
             // The first line is the lowest one.
             let rows_down = if y > 0.0 { -(row as f64) } else { (lines.len() - 1 - row) as f64 };
-            // The lowest y at which the line is inside the picture.
+            // The smallest y at which the line is inside the picture.
             let top = label_bounds(drawn, Point2::new(x, 0.0), text, text_px).y2;
             let at = Point2::new(x, y.max(top) + rows_down * step);
             (at, label_bounds(drawn, at, text, text_px))

@@ -72,12 +72,13 @@ impl<A: Arm> Pictures<A> for LivePictures {
     }
 }
 
-/// The position of a part in the base frame: its outline, and the heights of the table and of the outline.
+/// The position of a part in the base frame: its outline, and the heights of the surface under the part and of the
+/// outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenOutline {
     /// Corners of the outline (x, y), in metres.
     pub outline_in_base: Vec<Point2<f64>>,
-    /// z of the table and of the outline, in metres.
+    /// z of the surface under the part and of the outline, in metres.
     pub z_m: [f64; 2],
 }
 
@@ -116,7 +117,7 @@ struct Sights {
 pub const UNKNOWN_HEIGHTS_M: RangeInclusive<f64> = -0.010..=0.080;
 /// Relative margin of the searched sizes at both ends of their range, for errors of poses.
 const SIZE_LEEWAY: f64 = 0.03;
-/// Standard deviation of a part's height from its apparent size, in metres.
+/// Standard deviation of a height that was derived from the part's apparent size, in metres.
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
 /// In a picture for measuring a height: maximum horizontal distance of the part from its expected position, in metres.
 const SAME_PART_M: f64 = 0.040;
@@ -126,7 +127,7 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface is searched within this number of standard deviations of the expected height.
 const SURFACE_SIGMAS: f64 = 3.5;
-/// Smallest and largest half width of that range, in metres.
+/// Smallest and largest half width of the range in which the surface is searched, in metres.
 const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Ratio of the radius that contains 68 % of position errors to their standard deviation along x or y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
@@ -171,8 +172,9 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
-    /// Finds the part for a plan, without measuring the part's height. Searches at the given or taught height first; if
-    /// no detection there is sure, takes a second picture and searches at all possible heights.
+    /// Finds the part for a plan, without measuring the part's height. Searches first for parts on a surface at
+    /// [`MountedCamera::table_height_m`]. If no detection there is sure and [`Self::with_heights`] has set a range,
+    /// takes a second picture and searches the whole range.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -277,8 +279,8 @@ impl<P> ModelFinder<P> {
         })
     }
 
-    /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the demonstrations' sizes
-    /// differ, or if the picture was not compared with a demonstration.
+    /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the model knows no
+    /// lengths, if the demonstrations' sizes differ, or if the picture was not compared with a demonstration.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();

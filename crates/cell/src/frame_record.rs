@@ -50,7 +50,7 @@ pub struct PartRecord {
     /// The detection.
     #[serde(flatten)]
     pub found: FoundRecord,
-    /// As in the records of pictures: the indices of the parts that the jaws would touch.
+    /// Indices, in the list of detections, of the parts that the jaws would touch.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jaws_touch: Vec<usize>,
     /// Number of the part's track; absent without tracking, like the next two fields.

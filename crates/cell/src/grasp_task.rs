@@ -79,7 +79,7 @@ impl GraspTask {
         }
     }
 
-    /// The finder of the part, which ignores parts that lie in a place.
+    /// The finder of the part. If the part is to be placed, the finder ignores parts that lie in a place.
     pub fn finder<P>(&self, pictures: P) -> ModelFinder<P> {
         let mut finder = ModelFinder::new(self.model.clone(), self.camera, pictures);
         if self.config.height.is_some() {

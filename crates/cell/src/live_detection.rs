@@ -14,7 +14,8 @@ use crate::perception::{Found, Perception};
 /// Maximum wait for the newest frame.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// The frames of a camera: the newest frame of a stream; or every frame of stored, rendered and on-request pictures.
+/// The frames of a camera. A stream gives only its newest frame. A simulated camera and a camera that delivers pictures
+/// on request give every frame.
 pub enum Frames {
     /// The newest frame. Frames that were not read in time are dropped.
     Newest(LatestFrame),

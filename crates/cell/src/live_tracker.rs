@@ -80,8 +80,8 @@ impl LiveTracker {
         Ok(Self { tracker: Tracker::new(perception.to_part_detector(), config), searches })
     }
 
-    /// Tracks all known parts into a frame. A frame that does not continue the previous one is searched first;
-    /// otherwise due searches run as [`SearchTime`] defines. `captured` is measured from any fixed time.
+    /// Tracks all known parts in a frame. A frame that does not continue the previous one is searched first; otherwise
+    /// due searches run as [`SearchTime`] defines. `captured` is measured from any fixed time.
     ///
     /// # Errors
     /// Errors of a search, for example a picture that is too small; or the search thread has ended.

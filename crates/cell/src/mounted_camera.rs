@@ -15,7 +15,8 @@ pub struct MountedCamera {
     pub intrinsics: PinholeCamera,
     /// The pose relative to the mount.
     pub pose: CameraPose,
-    /// The table's z in the robot's base frame, in metres.
+    /// The table's z in the robot's base frame, in metres, or z of the surface under the parts after
+    /// [`Self::with_marks_at`].
     pub table_height_m: f64,
 }
 

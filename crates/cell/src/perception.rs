@@ -132,7 +132,7 @@ impl Perception {
     /// Detects the part in a picture; the detections are ordered by decreasing score.
     ///
     /// # Errors
-    /// The picture's size differs from the size for the calibrated camera or for the region; or the model fails.
+    /// The errors of [`Self::check_picture`]; or the model fails.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         self.check_picture(picture)?;
         Ok(match &self.view {
@@ -147,10 +147,11 @@ impl Perception {
         })
     }
 
-    /// Checks that a picture can be from the calibrated camera, and that the region is inside the picture.
+    /// Checks that a picture has the size of the calibrated camera's pictures, and that the region is for pictures of
+    /// this size and inside the picture.
     ///
     /// # Errors
-    /// The picture has a different size, or the region is not inside it.
+    /// The picture has another size, or the region is for another size or not inside the picture.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         self.check_size(picture)?;
         if let Some(region) = self.region() {
@@ -230,7 +231,8 @@ impl Perception {
         }
     }
 
-    /// Length of a pixel in the plane of the marks, in metres; `None` if the camera's pose is unknown.
+    /// Length of a pixel in the plane of the marks, in metres; `None` if the camera's pose is unknown or the pixel does
+    /// not show this plane.
     pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
         match &self.view {
             View::AnyCamera(_) => None,

@@ -44,8 +44,8 @@ const MIN_SHARE: f64 = 0.3;
 const MIN_QUADRANTS: usize = 3;
 /// Number of windows that count as one, because windows overlap and are not independent.
 const WINDOWS_PER_VOTE: f64 = 4.0;
-/// Resampling error common to all windows, in metres. Fitted together with [`WINDOWS_PER_VOTE`] by `heights`, so that
-/// the ratio of errors to their sigmas has a standard deviation of 1.
+/// Resampling error common to all windows, in metres. Fitted together with [`WINDOWS_PER_VOTE`] by
+/// crates/cli/examples/heights.rs, so that the ratio of errors to their sigmas has a standard deviation of 1.
 const COMMON_SIGMA_M: f64 = 0.12e-3;
 
 /// A picture and its camera.
@@ -273,7 +273,8 @@ mod tests {
         row(low) * (1.0 - up) + row(low + 1) * up
     }
 
-    /// A picture of a surface whose height depends on the position, seen vertically from 0.3 m above `x_m`.
+    /// A picture of a surface whose height depends on the position. The camera is at (`x_m`, 0, 0.3 m) and points
+    /// straight down.
     fn view(x_m: f64, surface_m: fn(&Point2<f64>) -> f64, brightness: fn(f64, f64) -> f64) -> PosedPicture {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
         let world_from_camera = Isometry3::from_parts(Vector3::new(x_m, 0.0, 0.3).into(), down);
@@ -332,7 +333,7 @@ mod tests {
             ahead.map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min)
         };
         // Across the baseline, the nearest window (radius 5 mm) begins 2 mm from the outline. Along the baseline, the
-        // top hides 30 mm · 0.085 / 0.3 more.
+        // part's top hides 30 mm · 0.085 m / 0.3 m more.
         let (along, beside) = (nearest(Vector2::x()), nearest(Vector2::y()));
         assert!((0.0265..0.033).contains(&beside) && along > beside + 0.004, "{along} {beside}");
     }

@@ -146,7 +146,7 @@ impl WorkcellMap {
 
     fn draw_obstacle(&self, image: &mut RgbImage, obstacle: &Obstacle, labels: &mut Labels) {
         let Some(outline) = seen_from_above(obstacle) else {
-            // An unbounded wall has no outline.
+            // A plane has no outline.
             return;
         };
         let polygon = self.polygon(&outline);
@@ -233,7 +233,7 @@ impl Labels {
                     bounds.x1 < other.x2 && other.x1 < bounds.x2 && bounds.y1 < other.y2 && other.y1 < bounds.y2
                 })
             };
-            // Moved down step by step until it is clear of other labels.
+            // Moves the label down step by step until it overlaps no other label.
             let mut place = at;
             let mut bounds = label_bounds(image, place, &text, TEXT_PX);
             while overlaps(&bounds) && bounds.y2 < f64::from(image.height()) - 1.0 {

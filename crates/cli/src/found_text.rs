@@ -74,7 +74,7 @@ impl FoundText<'_> {
         let see_all = if are_listed { "" } else { " (see --all)" };
         let (x, y) = (best.grasp.x, best.grasp.y);
         let why = self.refusal(best).unwrap_or_default();
-        // A second advice would contradict the first.
+        // Beside other advice, the hint about the size is left out, because it would contradict the advice.
         let other_size = advice_for(best).map_or_else(|| self.of_other_size(), |_| None);
         format!(
             "{}{region}; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Minimum time between two separate signals: `timeout -s INT` sends the signal to the process and to its group.
+/// Minimum time between two separate signals: `timeout -s INT` sends one signal twice, to the process and to its group.
 const DEBOUNCE: Duration = Duration::from_millis(500);
 
 /// Whether Ctrl-C was pressed.
@@ -17,7 +17,7 @@ impl Interrupt {
         let interrupt = Self::default();
         let flag = Arc::clone(&interrupt.0);
         let mut first: Option<Instant> = None;
-        // Without a handler, Ctrl-C ends the process; no half-written file is left then either.
+        // If no handler can be set, Ctrl-C ends the process; even then, no half-written file is left.
         let _ = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
             if first.get_or_insert_with(Instant::now).elapsed() > DEBOUNCE {

@@ -29,7 +29,7 @@ impl Formatter for Rounded {
 
     fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
         let rounded = if value.abs() < MAX_ROUNDED { (value * ROUND_TO).round() / ROUND_TO } else { value };
-        // Adding zero keeps a small negative number from being rounded to negative zero.
+        // A small negative number is rounded to negative zero; adding zero makes it positive zero.
         CompactFormatter.write_f64(writer, rounded + 0.0)
     }
 }

@@ -7,8 +7,8 @@
 //! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) the program is
 //! suited to small machines: it teaches and detects, without MuJoCo, EGL and the annotation page.
 //!
-//! The binary only calls [`run`]. Other crates do the work; this crate has the arguments, texts, progress and exit
-//! codes. It is not an interface for other programs.
+//! The binary calls [`parse_args`] and [`run`]. Other crates do the work; this crate has the arguments, texts, progress
+//! and exit codes. It is not an interface for other programs.
 //!
 //! ```
 //! use clap::Parser;

@@ -27,7 +27,7 @@ const LIVE: &str = "Live pictures";
 const DEFAULT_SIZE: (u32, u32) = (640, 480);
 /// Default time without a frame after which a camera is stale.
 const DEFAULT_STALL_SECS: f64 = 2.0;
-/// Number of consecutive faults after which reading ends: half a minute with the default stall timeout.
+/// Maximum number of consecutive faults that are skipped: half a minute with the default stall timeout.
 const MAX_FAULTS: u32 = 15;
 
 /// Settings of a camera.
@@ -114,7 +114,7 @@ impl RequestArgs {
             encoding: self.encoding.map(Encoding::from),
             exposure_secs: self.exposure_ms.map(|ms| ms / 1e3),
             white_balance_kelvin: self.white_balance_kelvin,
-            // Invalid times are rejected, with their value, when the camera is opened.
+            // A time that `Duration` cannot represent becomes zero, which is rejected when the camera is opened.
             stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS))
                 .unwrap_or_default(),
             ..OpenOptions::default()

@@ -181,8 +181,8 @@ fn size_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a size", [1.0, 5000.0])
 }
 
-/// Parses a length from `min` to `max`, which must also be zero or at least 0.1 mm: a smaller positive number was
-/// probably given in metres.
+/// Parses a length from `min` to `max`. The length must also be zero or at least 0.1 mm, because a smaller positive
+/// number was probably given in metres.
 pub fn millimetres(text: &str, name: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
     const MIN_MM: f64 = 0.1;
     let number = text.parse().unwrap_or(f64::NAN);

@@ -53,8 +53,8 @@ fn unreadable_images_are_refused_by_name() {
 fn a_decompression_bomb_is_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let bomb = folder.path().join("bomb.png");
-    // A valid header that announces 60000 × 60000 pixels; width and height are bytes 16 to 23, followed by the CRC of
-    // IHDR.
+    // A valid header that announces 60000 × 60000 pixels; width and height are bytes 16 to 23, and the CRC of IHDR is
+    // bytes 29 to 32.
     let mut bytes = fs::read(shipped("pendulum", "image.png")).unwrap();
     bytes[16..20].copy_from_slice(&60_000u32.to_be_bytes());
     bytes[20..24].copy_from_slice(&60_000u32.to_be_bytes());

@@ -60,7 +60,7 @@ fn write_torchvision_model(model: &str, path: &Path) {
     for (name, shape) in names {
         let count = shape.iter().product();
         let values: Vec<f32> = match shape.len() {
-            // Variances and the scales of norms named `bn` are 1; all other values are 0.
+            // Variances and the scales of norms named `bn` are 1; all other values of vectors are 0.
             0 | 1 => {
                 vec![
                     if name.ends_with("var") || name.contains("bn") && name.ends_with("weight") { 1.0 } else { 0.0 };

@@ -71,8 +71,8 @@ fn attribute(element: &str, name: &str) -> Option<f64> {
     element.split_once(&format!(" {name}=\""))?.1.split_once('"')?.0.parse().ok()
 }
 
-/// The area that the SVG's squares and dots print, by positions in squares from the lower left corner of the first
-/// square.
+/// Whether the SVG's squares and dots print a position. Positions are in squares, from the lower left corner of the
+/// first square.
 fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
     let squares: Vec<[f64; 3]> = svg
         .lines()
@@ -200,7 +200,7 @@ fn a_camera_s_frames_are_taken_where_they_show_something_new() {
     fs::create_dir(&frames).unwrap();
     let poses = poses(&camera);
     let mut random = Random(4);
-    // Each view twice, with pictures without the board between them.
+    // Each view twice, and after every fifth view a picture without the board.
     for (k, pose) in poses.iter().enumerate() {
         for copy in 0..2 {
             let picture = render(&board(), &camera, pose, &Exposure::ORDINARY, &mut random);

@@ -2,7 +2,7 @@
 //!
 //! Rounding to half precision moves every box a little. Non-maximum suppression keeps the highest score of overlapping
 //! boxes; if two scores are nearly equal, rounding may change which box is kept, although no box has moved. Each
-//! detection is therefore compared with the same candidate before suppression, and changes of the kept box are counted
+//! detection is therefore compared with the same box before suppression, and changes of the kept box are counted
 //! separately: each must be a tie. In the same way a keypoint is the highest place of a heat map; if two places are
 //! nearly equally high, rounding may change which of them is read. The heights must then be nearly equal.
 
@@ -86,7 +86,7 @@ fn converted(checkpoint: &Path, network: &RcnnConfig, flags: &[&str]) -> (u64, s
     (std::fs::metadata(&out).unwrap().len(), base.parameters)
 }
 
-/// A detector, and the same detector without suppression, which gives all candidates.
+/// A detector, and the same detector without suppression, which gives all boxes.
 struct Detector {
     whole: GeneralizedRcnn,
     unsuppressed: GeneralizedRcnn,
@@ -119,7 +119,7 @@ fn box_difference(a: &Detections, i: usize, b: &Detections, j: usize) -> f64 {
     [a.x1 - b.x1, a.y1 - b.y1, a.x2 - b.x2, a.y2 - b.y2].into_iter().fold(0.0f64, |most, d| most.max(d.abs()))
 }
 
-/// The distance of each keypoint along the farther axis, and the difference of its scores.
+/// For each keypoint, the larger of its distances in x and y, and the difference of its scores.
 fn keypoint_differences(a: &Detections, i: usize, b: &Detections, j: usize) -> Vec<[f64; 2]> {
     let pairs = a.keypoints[i].iter().zip(&b.keypoints[j]);
     pairs.map(|(a, b)| [(a.x - b.x).abs().max((a.y - b.y).abs()), (a.score - b.score).abs()]).collect()

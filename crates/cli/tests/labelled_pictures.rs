@@ -53,8 +53,9 @@ fn marked(annotation: &Value) -> Marked {
     }
 }
 
-/// Parts, found, wrong, pictures without the part, false alarms: by an independent implementation of the definition,
-/// from the output of `sdg detect` and the marks in the file. Samples show at most one part, so the first hit decides.
+/// Numbers of parts, of found parts, of wrong detections, of pictures without the part, and of false alarms. An
+/// independent implementation counts them from the output of `sdg detect` and the marks in the file. Samples show at
+/// most one part, so the first hit decides.
 fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let file = read_json(&samples.join("annotations.json"));
     let demonstration = read_json(&shipped("pendulum", "annotation.json"));
@@ -163,7 +164,7 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     let expected = counted_naively(&samples, &model);
     assert_eq!(counts(&evaluated), expected);
     let [parts, found, _, negatives, _] = expected;
-    // Otherwise there would have been nothing to compare.
+    // With smaller numbers, the comparison would test nothing.
     assert!(found > 0 && negatives > 0 && parts > found / 2, "{expected:?}");
     assert_eq!(evaluated["pictures"].as_array().unwrap().len(), NUM_SAMPLES);
     assert_eq!(evaluated["missed"], json!(parts - found));
@@ -291,7 +292,7 @@ fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
     let model = teach(folder.path());
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
-    // Saved as JPEG under another name, it is still recognised as the photo from which the model was taught.
+    // The photo from which the model was taught is recognised even if it is saved as JPEG under another name.
     write_turned(&pictures, "copy.jpg", 0, 0.0);
     for quarters in 1..4 {
         write_turned(&pictures, &format!("turned-{quarters}.png"), quarters, 0.8);

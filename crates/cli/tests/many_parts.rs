@@ -48,7 +48,7 @@ fn parts_that_look_alike_are_told() {
     }
     let page = fs::read_to_string(found["report"].as_str().unwrap()).unwrap();
     assert!(page.contains("3 parts taught") && page.contains("Look-alikes"));
-    // The page shows each part's photo with the detections of its model.
+    // The page shows each part's photo with the part's name and its model's result.
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }

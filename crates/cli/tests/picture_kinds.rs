@@ -1,5 +1,5 @@
-//! Pictures in the formats of cameras and programs: the result depends neither on the storage format nor on the way of
-//! opening.
+//! Pictures in the formats of cameras and programs: the result depends neither on the storage format nor on whether a
+//! picture is read as a file or as a frame.
 
 use std::fs;
 use std::io::Cursor;

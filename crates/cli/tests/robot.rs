@@ -81,7 +81,7 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     assert!(height["source"] == "measured" && (height_mm - 16.0).abs() < 1.0 && sigma_mm < 3.0, "{line}");
     assert!(!states.exists(), "nothing went wrong");
 
-    // A height that contradicts the measurement is refused, and 0 is a height.
+    // A given height that contradicts the measurement is refused; 0 counts as a given height.
     let states_of = ["--states", text(&states), "--speed", "0.6", "--from", "sim:pendulum?seed=3"];
     let wrong = sdg(&[&base[..], &states_of, &["--mark-height-mm", "0", "--mark-height-sigma-mm", "0.5"]].concat());
     let stderr = String::from_utf8(wrong.stderr).unwrap();

@@ -22,8 +22,8 @@ fn workcell(folder: &Path) -> PathBuf {
     path
 }
 
-/// Times after the start at which the motion is disturbed. If the motion has not begun by then, the next time is tried:
-/// when it begins depends on the machine.
+/// Times after the message `moving home` at which a test disturbs the motion. A test tries them in turn until the
+/// motion has begun by that time; when it begins depends on the machine.
 const MOVING: [Duration; 5] = [
     Duration::from_millis(500),
     Duration::from_secs(1),
@@ -32,19 +32,20 @@ const MOVING: [Duration; 5] = [
     Duration::from_secs(8),
 ];
 
-/// Tries the times of [`MOVING`] until the motion was in progress.
+/// Tries the times of [`MOVING`] until one of them lies within the motion.
 fn once_moving<T>(attempt: impl FnMut(Duration) -> Option<T>) -> T {
     MOVING.into_iter().find_map(attempt).expect("the arm moves within 8 s")
 }
 
-/// `sdg robot home`, in motion.
+/// A running `sdg robot home`, whose motion has been announced.
 struct Moving {
     child: Child,
     stderr: BufReader<ChildStderr>,
 }
 
 impl Moving {
-    /// At a hundredth of the speed, the motion takes a minute of simulated time.
+    /// Waits for the time `moving_for` after the message. At a hundredth of the speed, the motion takes a minute of
+    /// simulated time.
     fn start(simulated: &Simulated, workcell: &Path, states: &Path, moving_for: Duration) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
             .args(["robot", "home", "--robot", &simulated.address, "--yes", "--no-realtime", "--speed", "0.01"])

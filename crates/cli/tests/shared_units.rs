@@ -283,7 +283,7 @@ fn failures_are_recorded_and_told() {
     refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still running on n7 (process 12, job 31)"]);
     let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
     assert_eq!((&watched["running"][0]["unit"], &watched["running"][0]["by"]["host"]), (&LOOK.into(), &"n7".into()));
-    // A second process for the same unit waits until it is free.
+    // A second process for the same unit waits until the unit is free.
     let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
     command.args(arguments(&out, &["--unit", LOOK])).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut waiting = command.spawn().unwrap();
@@ -295,7 +295,7 @@ fn failures_are_recorded_and_told() {
     );
     assert!(waiting.try_wait().unwrap().is_none());
     drop(lock);
-    // Then it begins, and reports what is missing.
+    // The second process then begins, and reports what is missing.
     assert_eq!(waiting.wait().unwrap().code(), Some(1));
     fs::write(unit.join("running.json"), running).unwrap();
     let gone = "look-rod_end: missing: n7 (process 12, job 31) ended without a result";

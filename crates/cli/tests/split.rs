@@ -7,7 +7,8 @@ use std::path::Path;
 use crate::support::{Folder, sdg, shipped, stdout, taught_pendulum};
 use serde_json::{Value, json};
 
-/// Number of samples, enough that some with each change of [`write_set`] are accepted, and some unchanged ones.
+/// Number of samples. With this many, samples with each change of [`write_set`], and some without a change, are
+/// accepted.
 const NUM_SAMPLES: &str = "20";
 
 fn read_json(path: &str) -> Value {
@@ -69,8 +70,9 @@ fn write_split(folder: &Folder) -> String {
     folder.text("split.toml", &(set("lever", "tuned") + &set("gone", "reported")))
 }
 
-/// Parts, found, accepted in pictures with the part, wrong, pictures without the part, false alarms: by the rule of the
-/// sets' own scripts, from the output of `sdg detect`.
+/// Numbers of parts, of found parts, of detections accepted in pictures with the part, of wrong detections, of pictures
+/// without the part, and of false alarms. They are counted from the output of `sdg detect` by the rule of the sets' own
+/// scripts.
 fn counted_naively(set: &str, model: &str) -> [u64; 6] {
     let [mut parts, mut found, mut accepted, mut wrong, mut negatives, mut false_alarms] = [0; 6];
     for entry in read_json(&format!("{set}/truth.json")).as_array().unwrap() {

@@ -1,9 +1,9 @@
 //! A timed walk-through, from a photo to a tried model, on sets of photos that are not in this repository (`make walk
 //! SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
 //!
-//! The page's waiting times are measured. The user's times are added: for actions by the keystroke-level model (Card,
-//! Moran, Newell 1980), and for reading every new line on the page at 238 words a minute (Brysbaert 2019).
-//! `SDG_WALK_WORDS=1` prints these lines. A line in which only numbers or the full stop change is not counted again;
+//! The page's waiting times are measured. The user's times are calculated and added: for actions by the keystroke-level
+//! model (Card, Moran, Newell 1980), and for reading every new line on the page at 238 words a minute (Brysbaert 2019).
+//! `SDG_WALK_WORDS=1` prints the new lines. A line in which only numbers or the full stop change is not counted again;
 //! text for screen readers is not counted.
 
 use std::collections::BTreeSet;
@@ -18,14 +18,14 @@ const MAX_SECONDS: f64 = 180.0;
 /// Maximum number of words to read. The limit of issue 47 is 140 seconds, of which 40 are actions and, on an idle
 /// computer, 7 are waiting; the rest is for reading.
 const MAX_WORDS: usize = 370;
-/// Time to decide on the next action, to move the pointer to it, and to press.
+/// Time to decide on the next action, to move the pointer to its control, and to press the button.
 const ACTION_SECONDS: f64 = 1.35 + 1.1 + 0.2;
 const WORDS_PER_SECOND: f64 = 238.0 / 60.0;
 /// Relative margin of a person's box around the part.
 const BOX_LOOSENESS: f64 = 0.03;
 const MAX_TRIED: usize = 3;
 
-/// The steps so far and their times.
+/// The page, and what the steps so far have cost: actions, words to read, and seconds of waiting.
 struct StopWatch {
     page: Page,
     set: String,

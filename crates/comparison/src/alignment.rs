@@ -123,7 +123,7 @@ fn catmull_rom(t: f64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Cosines that are largest at the shift that `offset` gives the cell, and decrease away from it.
+    /// Cosines that are largest at each cell's shift by `offset`, and decrease with the distance from this shift.
     fn cosines(offset: &PlanarSimilarity, map_px: usize, reach: usize) -> Vec<f32> {
         let (middle, side) = (0.5 * (map_px as f64 - 1.0), 2 * reach + 1);
         let at = |shift: usize, cell: usize| {

@@ -10,15 +10,15 @@
 //! network only judges their similarity. This question is the same for every part: the network is trained once, on
 //! generated parts and their look-alikes, and teaching only adds the demonstration.
 //!
-//! **Frame of a view.** A square about the centre of the outline's box, in the demonstration's direction, x right, y
-//! down.
+//! **Frame of a view.** A square about the centre of the outline's box; x points right and y down in the
+//! demonstration's image.
 //!
 //! Not in this crate: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
 //!
 //! # Source
-//! Two images as channels of one input: the 2-channel network of Zagoruyko and Komodakis, Learning to Compare Image
-//! Patches via Convolutional Neural Networks (2015). Log-odds of a pose, from a picture and a view of the object in
-//! that pose: Labbé and others, MegaPose (2022).
+//! Comparison of two images by one network: Zagoruyko and Komodakis, Learning to Compare Image Patches via
+//! Convolutional Neural Networks (2015). Log-odds of a pose, from a picture and a view of the object in that pose:
+//! Labbé and others, MegaPose (2022).
 //!
 //! # Example
 //! ```

@@ -11,7 +11,7 @@ use crate::view::{Batch, DIFFERENCES, View};
 
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
-/// Added to the squared length of a cell's features, so that a cell without features has the direction zero.
+/// Added to the squared length of a cell's features, so that the cosines of a cell without features are 0.
 const SQUARE_EPSILON: f32 = 1e-4;
 
 /// The comparison network.
@@ -59,7 +59,7 @@ impl ComparisonNetwork {
         let head = stages(compared, 3, &config.stage_channels, &config.stage_convs, groups, init);
         let flat = config.stage_channels.last().copied().unwrap_or(compared) * config.last_map_px().pow(2);
         let hidden = Linear::init(flat, config.hidden, Distribution::he_normal(flat), init);
-        // Small first outputs: log-odds near zero.
+        // Small initial weights, so that the first log-odds are near zero.
         let output = Linear::init(config.hidden, 1, Distribution::Normal { std: 0.01 }, init);
         Self { trunk, stages: head, hidden, output, config: config.clone() }
     }

@@ -12,11 +12,11 @@ use crate::config::ComparisonConfig;
 
 /// Channels of each image: the colours, and the colours normalised by their mean and deviation on the part.
 const COLOURS: usize = 6;
-/// Channels of differences: one per colour channel, between the two images on the part, and the fraction of each cell
-/// inside the outline.
+/// Channels of differences: for each colour channel the difference of the two images on the part, and the fraction of
+/// each cell inside the outline.
 pub const DIFFERENCES: usize = COLOURS + 1;
 
-/// Side of a view over the longer side of the outline's box: leaves a margin for small errors of the pose.
+/// Side of a view relative to the longer side of the outline's box. The margin is for small errors of the pose.
 const SIDE_PER_LENGTH: f64 = 1.25;
 /// Grey values per unit of the colours: about the standard deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
@@ -228,7 +228,8 @@ mod tests {
         ComparisonConfig { input_px: 32, trunk_channels: Vec::new(), ..ComparisonConfig::edge() }
     }
 
-    /// The greatest difference between the demonstration and the picture inside the outline, over three channels.
+    /// The greatest difference between the demonstration and the picture inside the outline, over the three channels
+    /// from `first`.
     fn difference(reference: &Reference, view: &View, first: usize) -> f32 {
         let n = reference.mask.len();
         let inside = |i: &usize| reference.mask[*i] == 1.0;

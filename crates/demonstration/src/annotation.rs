@@ -69,7 +69,7 @@ impl Annotation {
         /// Minimum overlap (IoU) of the box and the outline's bounding box: a box with a margin of 40 % on each side
         /// has 0.31.
         const MIN_IOU: f64 = 0.3;
-        /// Files round coordinates.
+        /// Maximum distance in pixels of sides that count as equal, because files round coordinates.
         const ROUNDING_PX: f64 = 1.5;
         let contradictory = |expected, found| Err(Error::Contradictory { label: self.label.clone(), expected, found });
         let in_words = |bounds: &BoundingBox| {

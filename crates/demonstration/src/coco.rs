@@ -29,7 +29,8 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     Ok(instances.into_iter().map(|instance| instance.annotation).collect())
 }
 
-/// Maximum number of annotations of an image times categories. For each annotation all categories are searched.
+/// Maximum product of the numbers of an image's annotations and of categories, because all categories are searched for
+/// each annotation.
 const MAX_COMPARISONS: usize = 10_000_000;
 
 /// Reads the objects of one image of a COCO file, if any.
@@ -62,7 +63,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
     if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
         of_image.retain(|annotation| !is_foreign_annotation(annotation));
     }
-    // Beside an annotation with a grasp, keypoints of a category with other names mark something else.
+    // If one annotation has a grasp, keypoints of a category with other keypoint names mark something else.
     let has_grasp = |annotation: &Node| {
         let category = category_of(annotation, &categories).ok().flatten();
         category.is_some_and(|category| is_of_grasps(category)) && has_keypoints(annotation)
@@ -265,7 +266,7 @@ impl CocoFile {
                 attributes.insert("jaw_width".into(), json!(width));
             }
             if let Some(line) = &object.grasp {
-                // For people and other programs: it follows from box and keypoints, and is not read.
+                // `grasp_offset` is for people and other programs: it follows from box and keypoints, and is not read.
                 let offset = line.center() - object.bbox.center();
                 attributes.insert("grasp_offset".into(), json!([offset.x, offset.y]));
             }
@@ -478,7 +479,7 @@ mod tests {
             let mut file = CocoFile::new();
             file.push_image("a.png", 640, 480, std::slice::from_ref(&made));
             let read = Annotation::read(file.to_json().as_bytes(), &IMAGE).unwrap().remove(0);
-            // Decimal text and x + (x2 - x) each cost a last bit.
+            // Decimal text and x + (x2 - x) may each change the last bit.
             let close = |a: Point2<f64>, b: Point2<f64>| (a - b).norm() < 1e-9;
             prop_assert!(read.bbox.corners().iter().zip(bbox.corners()).all(|(&a, b)| close(a, b)));
             let (grasp, wanted) = (read.grasp.unwrap(), made.grasp.unwrap());

@@ -1,6 +1,7 @@
 //! The entries of a YOLO dataset's `data.yaml` that its labels need: `names`, `kpt_shape` and `kpt_names`.
 //!
-//! It reads the usual forms: a list in brackets, a list of dashes, a map from numbers. Other entries are ignored.
+//! This module reads the usual forms: a list in brackets, a list with dashes, and a map from numbers. It ignores other
+//! entries.
 
 use crate::{Error, Result};
 
@@ -119,7 +120,7 @@ fn entry(text: &str, name: &str) -> Option<Vec<(Option<String>, String)>> {
         let mut is_closed = whole.contains([']', '}']);
         while !is_closed {
             let line = without_comment(lines.next()?);
-            // Only the new line is searched: the text may have as many lines as bytes.
+            // Only the new line is searched, because searching `whole` after each line would take quadratic time.
             is_closed = line.contains([']', '}']);
             whole += " ";
             whole += line;

@@ -49,7 +49,7 @@ fn is_same_folded(one: &str, other: &str) -> bool {
     one == other || one == resolved_other || resolved_one == other
 }
 
-/// With `%20` and similar escapes resolved; the unchanged name if the result is not UTF-8.
+/// The name with `%20` and similar escapes resolved; the unchanged name if the result is not UTF-8.
 pub(crate) fn without_escapes(name: &str) -> String {
     let bytes = name.as_bytes();
     let hex = |at: usize| char::from(*bytes.get(at)?).to_digit(16);
@@ -69,7 +69,7 @@ pub(crate) fn without_escapes(name: &str) -> String {
     String::from_utf8(resolved).unwrap_or_else(|_| name.to_owned())
 }
 
-/// With the combining accents of macOS composed with their letters, for the letters of European languages.
+/// The name with the combining accents of macOS composed with their letters, for letters of European languages.
 fn composed(name: &str) -> String {
     const ACCENTS: [(char, &str, &str); 6] = [
         ('\u{300}', "aeiouAEIOU", "àèìòùÀÈÌÒÙ"),

@@ -9,7 +9,7 @@ pub struct LabelledInstance {
     /// The marks, in pixels of the picture. If the picture's border clips the part, the box is clipped and the outline
     /// left out.
     pub annotation: Annotation,
-    /// Whether the instance does not count: not finding it is no miss, and a detection of it is no false detection. For
+    /// Whether the instance is left out of the counts, so that neither missing it nor detecting it is an error. For
     /// parts that are mostly covered or seen from another side. LabelMe: the flag `optional` of any shape of the group;
     /// COCO: `attributes.optional`.
     pub optional: bool,

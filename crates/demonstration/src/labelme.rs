@@ -36,7 +36,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
         return Ok(Vec::new());
     }
 
-    // One group, or none at all, is one object, even if not every shape carries the id.
+    // If the shapes have at most one group id, all shapes are one object, even those without the id.
     let ids: BTreeSet<&str> = shapes.iter().filter_map(|shape| shape.group.as_deref()).collect();
     let ungrouped = shapes.iter().filter(|shape| shape.group.is_none()).count();
     if ids.len() <= 1 {
@@ -341,7 +341,7 @@ mod tests {
         assert!(message("\u{89}PNG").contains("not JSON"));
     }
 
-    /// Every marked position. Reading decimal text costs a last bit.
+    /// Every marked position. Reading decimal text may change the last bit.
     fn points(marked: &Annotation) -> impl Iterator<Item = Point2<f64>> {
         let line = marked.grasp.iter().flat_map(|line| [line.start, line.end]);
         let outline = marked.outline.iter().flat_map(|outline| outline.vertices.iter().copied());

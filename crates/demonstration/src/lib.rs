@@ -12,7 +12,8 @@
 //! makes any number of samples by random access: sample *i* of a seed is the same on every call.
 //!
 //! This crate deliberately has no files, threads or clocks (bytes in, bytes out; it runs in a browser), no tensors or
-//! training targets (`sdg-training`), and no mirror images, which would be other parts.
+//! training targets (`sdg-training`), and no mirror images as samples of the part, because a mirror image is another
+//! part.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};

@@ -31,8 +31,7 @@ impl Raster {
 
     /// Bilinear at (x, y) with the first pixel's centre at (0.5, 0.5); outside, border pixels are repeated.
     ///
-    /// Reads four floats at once, without a branch, unlike `sdg-shape`'s sampling, which reads three bytes of an image
-    /// and ends at the border.
+    /// Reads four floats at once, without a branch. The sampling of `sdg-shape` reads bytes of an image instead.
     #[inline(always)]
     pub fn bilinear(&self, x: f32, y: f32) -> [f32; 4] {
         let u = (x - 0.5).clamp(0.0, (self.width - 1) as f32);

@@ -196,7 +196,7 @@ pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnota
             Some(line) => [line.start, line.end].map(|p| [p.x / across, p.y / down, 2.0]),
             None => [[0.0; 3]; 2],
         };
-        // Writing into a string cannot fail. Shortest digits that restore the value.
+        // Writing into a string cannot fail. A number has the shortest digits that restore its value.
         let _ = write!(text, "{class}");
         for number in shares.iter().chain(keypoints.iter().flatten()) {
             let _ = write!(text, " {number}");
@@ -347,7 +347,7 @@ mod tests {
             prop_assert_eq!(read.len(), 2);
             for (found, expected) in read.iter().zip(&marked) {
                 prop_assert_eq!(&found.label, &expected.label);
-                // Dividing and multiplying by the image's size costs a last bit.
+                // Dividing and multiplying by the image's size may change the last bit.
                 let close = |a: Point2<f64>, b: Point2<f64>| (a - b).norm() < 1e-9;
                 prop_assert!(found.bbox.corners().iter().zip(expected.bbox.corners()).all(|(&a, b)| close(a, b)));
                 prop_assert_eq!(found.grasp.is_some(), expected.grasp.is_some());

@@ -137,8 +137,8 @@ fn hard_shadows_are_left_out() {
 /// An outline includes a shadow and the part if it contains at least these fractions of them.
 const SHADOW_IN: f64 = 0.4;
 const PART_IN: f64 = 0.85;
-/// A shadow is removed if the outline includes a fraction of it that is larger by at most this than in the outline
-/// proposed on the same photo without the shadow.
+/// A shadow counts as removed if the outline includes a fraction of it that exceeds, by at most this, the fraction in
+/// the outline proposed on the same photo without the shadow.
 const SHADOW_OUT: f64 = 0.15;
 /// The outline must also keep this fraction of the overlap that the photo without the shadow gives.
 const OVERLAP_KEPT: f64 = 0.9;

@@ -18,7 +18,7 @@ pub use sdg_layers::NormKind;
 pub struct RcnnConfig {
     /// Conversion of the given image to the network's input.
     pub input: ImageTransformConfig,
-    /// The residual network, "bottom-up" of the feature pyramid.
+    /// The residual network, which is the bottom-up path of the feature pyramid.
     pub backbone: ResNetConfig,
     /// The feature pyramid.
     pub fpn: FpnConfig,

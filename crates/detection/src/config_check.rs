@@ -1,11 +1,11 @@
-//! Checks whether a detector can be built from a configuration, and with limited memory: a configuration may come from
-//! a stranger's file.
+//! Checks whether a detector can be built from a configuration, and without too much memory, because a configuration
+//! may come from an untrusted file.
 
 use crate::config::{NormKind, RcnnConfig, ResizeRule, RoiPoolerConfig, SamplingRatio};
 use crate::error::{DetectionError, Result};
 
 /// Maximum number of values in one layer's output for one image, nine times that of R-50 on the largest image (1333 ×
-/// 1333 pixels); one gigabyte.
+/// 1333 pixels); in single precision, one gigabyte.
 const MAX_OUTPUT_VALUES: f64 = (1 << 28) as f64;
 /// Maximum side of the resized image, in pixels; Detectron2 and torchvision use at most 1333.
 const MAX_SIDE_PX: u32 = 4096;

@@ -31,9 +31,9 @@ use sdg_layers::state_dict::{StateDict, WeightTensor};
 /// Number of samples per image, large enough that every anchor and proposal enters the losses, as in the reference.
 const ALL_SAMPLES: usize = 1_000_000;
 
-/// Gradients smaller than this fraction of the network's largest gradient are zero except for rounding, for example
-/// the gradient of a bias before a softmax over positions, because adding a constant to all positions changes nothing.
-/// Their relative differences are only noise.
+/// Gradients smaller than this fraction of the network's largest gradient are zero except for rounding, so their
+/// relative differences are only noise. An example is the gradient of a bias before a softmax over positions: adding a
+/// constant to all positions changes nothing.
 const NOISE_OF_GRADIENTS: f32 = 1e-6;
 
 /// Tolerances of a stage.
@@ -70,7 +70,7 @@ pub struct StageDifference {
 /// All comparisons, in the order of the stages.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct GoldenReport {
-    /// One comparison for each tensor.
+    /// One comparison for each tensor; two for the keypoints: positions and scores.
     pub stages: Vec<StageDifference>,
 }
 
@@ -155,7 +155,7 @@ impl<'a> Comparer<'a> {
         Self { reference, stages: Vec::new(), recorded: None }
     }
 
-    /// Compares one tensor, unless the reference lacks it.
+    /// Compares one tensor if the reference contains it, or records the tensor.
     fn compare(&mut self, name: &str, shape: &[usize], values: &[f32], tolerance: Tolerance) {
         if let Some(recorded) = &mut self.recorded {
             recorded.insert(name.to_owned(), WeightTensor { shape: shape.to_vec(), values: values.to_vec() });

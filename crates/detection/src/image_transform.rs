@@ -47,8 +47,8 @@ impl ImageTransform {
         self.apply_part(image, image.dimensions().into())
     }
 
-    /// Like [`Self::apply`], for a part of an image of width and height `whole`, resized by the factor of the
-    /// whole image.
+    /// Like [`Self::apply`], for an `image` that is a part of a larger image with width and height `whole`. The part is
+    /// resized by the factor of the larger image.
     ///
     /// # Errors
     /// The errors of [`Self::apply`].

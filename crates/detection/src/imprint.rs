@@ -135,8 +135,8 @@ const BATCH: usize = 16;
 
 impl Imprint {
     /// Returns the last layers of a detector of one class, by the parameters' names: the class scores, and the kernel
-    /// of the keypoint maps, which is the sum of the detector's kernel and the imprinted one. The first object of each
-    /// image is a view; without any view the result is empty.
+    /// of the keypoint maps, which is the sum of the detector's kernel and the imprinted one. The kernel is left out if
+    /// a keypoint is in no view. The first object of each image is a view; without any view the result is empty.
     ///
     /// # Errors
     /// No images, or targets that do not fit them.
@@ -173,7 +173,8 @@ impl Imprint {
         let (weights, biases) = self.class.classifier(sum / num_views as f64);
         let [weights, biases] = [values(weights), values(biases)];
         let zeros = vec![0.0; weights.len()];
-        // The background comes after the part; it is the reference for all scores.
+        // The row of the background follows that of the part. Its zeros make the background the reference for all
+        // scores.
         let rows = WeightTensor { shape: vec![2, weights.len()], values: [weights, zeros].concat() };
         layers.insert("roi_heads.box_predictor.cls_score.weight".into(), rows);
         let biases = WeightTensor { shape: vec![2], values: vec![biases[0], 0.0] };

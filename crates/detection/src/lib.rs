@@ -13,8 +13,8 @@
 //! network runs on the device; anchors, matching, sampling, decoding and NMS run on the host in plain Rust, because
 //! they are small. Everything random takes a seed.
 //!
-//! Elsewhere: files, threads and clocks; the optimiser and its schedule (crate `training`); image
-//! augmentation (crate `demonstration`).
+//! Not in this crate: files, threads and clocks; the optimiser and its schedule (crate `training`); image augmentation
+//! (crate `demonstration`).
 //!
 //! # Example
 //! ```

@@ -17,8 +17,8 @@ pub enum Match {
 /// Matches every candidate to the ground-truth box with the largest overlap.
 ///
 /// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the candidates with the
-/// largest overlap with a ground-truth box are positive at any IoU above 0; each of them is then matched to the box
-/// that it overlaps most, which may be a different one (Detectron2 and torchvision do the same).
+/// largest overlap with a ground-truth box are positive at any IoU above 0. Each of them is then matched to the box
+/// that it overlaps most, which may be another box. Detectron2 and torchvision do the same.
 pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &MatcherConfig) -> Vec<Match> {
     if gt_boxes.is_empty() {
         return vec![Match::Negative; candidates.len()];
@@ -82,7 +82,7 @@ mod tests {
         MatcherConfig { negative_below: 0.3, positive_from: 0.7, low_quality }
     }
 
-    // A 10 px high ground truth of width 10; a candidate of width w inside it has an IoU of w / 10.
+    // A ground truth of 10 × 10 px; a candidate of the same height and of width w inside it has an IoU of w / 10.
     const GT: Corners = [0.0, 0.0, 10.0, 10.0];
     fn inside(width: f32) -> Corners {
         [0.0, 0.0, width, 10.0]

@@ -195,8 +195,8 @@ impl RegionProposalNetwork {
 
     /// Returns the losses on objectness and deltas.
     ///
-    /// `gt_boxes` of each image are in pixels of the resized image; `rngs` has the random numbers
-    /// for sampling the anchors of each image.
+    /// `gt_boxes` of each image are in pixels of the resized image; `rngs` has one generator per image, for sampling
+    /// its anchors.
     pub fn losses(
         &self,
         predictions: RpnPredictions,
@@ -241,7 +241,7 @@ impl RegionProposalNetwork {
     }
 }
 
-/// Indices of the `k` largest values without NaN, largest first; equal values keep their order.
+/// Indices of the `k` largest values, largest first; NaN is skipped; equal values keep their order.
 fn top_k(values: &[f32], k: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
     let by_value = |a: &usize, b: &usize| values[*b].total_cmp(&values[*a]).then(a.cmp(b));

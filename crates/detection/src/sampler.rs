@@ -22,8 +22,8 @@ pub fn sample(matches: &[Match], config: &SamplerConfig, rng: &mut Pcg64Mcg) -> 
     sample_with_first(matches, config, 0.0, rng)
 }
 
-/// Like [`sample`], with the fraction `first_share` of the negatives taken from the start of the list, which for
-/// proposals has the highest objectness.
+/// Like [`sample`], but the fraction `first_share` of the negatives is taken from the start of the list, where the
+/// proposals with the highest objectness are.
 pub fn sample_with_first(matches: &[Match], config: &SamplerConfig, first_share: f64, rng: &mut Pcg64Mcg) -> Sampled {
     let mut positive = Vec::new();
     let mut negative = Vec::new();

@@ -99,7 +99,7 @@ fn agrees(folder: &Path) {
     agrees_but_for(folder, &|_| false);
 }
 
-/// Like `agrees`, but a stage outside its tolerance may be excused.
+/// Like `agrees`, but a stage for which `excused` returns true may be outside its tolerance.
 fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageDifference) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
@@ -144,10 +144,10 @@ fn torchvision_mask_agrees_at_every_stage() {
 /// Maximum relative difference of a gradient from double precision.
 ///
 /// In a whole network, some of the millions of activations are so near zero that rounding decides whether a ReLU passes
-/// their gradient. So torch's own single precision differs by up to 1.65e-3 from its double precision (after the
-/// keypoint head's eight convolutions with a ReLU each), ours by 1.1e-3, and the two single precisions differ by
-/// 1.7e-3. Therefore both are compared with double precision: ours must be within this bound, or at least as close as
-/// torch's.
+/// their gradient. So torch's gradients in single precision differ by up to 1.65e-3 from torch's gradients in double
+/// precision (after the keypoint head's eight convolutions with a ReLU each). Ours differ by 1.1e-3 from the latter,
+/// and by 1.7e-3 from torch's single precision. Therefore both are compared with double precision: our gradients must
+/// be within this bound, or at least as close as torch's.
 const WHOLE_GRADIENTS: f64 = 1e-3;
 
 /// The maximum difference, relative to the largest expected magnitude.

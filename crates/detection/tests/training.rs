@@ -11,7 +11,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Mask, Polygon};
 
 const NUM_KEYPOINTS: usize = 3;
 
-/// `edge`, reduced for a test: fewer channels and pixels, the same structure.
+/// `edge`, reduced for a test: fewer channels, blocks and pixels, otherwise the same structure.
 fn tiny() -> RcnnConfig {
     tiny_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS })
 }
@@ -151,7 +151,7 @@ fn the_seed_decides_every_bit() {
     assert_ne!(run(1, 1), run(1, 2));
 }
 
-/// Parameters by path, and those that a gradient reached.
+/// Collects the paths of the parameters that a gradient reaches, and those of the others.
 struct GradientCheck<'a> {
     path: Vec<String>,
     gradients: &'a Gradients,

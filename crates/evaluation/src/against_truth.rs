@@ -10,8 +10,8 @@ use sdg_grasp::{GraspError, GraspPlane, GraspPose};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 
-/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface at the marks, whose
-/// height a photo does not show.
+/// The hand's pose for a grasp in a camera's picture. The grasp is projected onto the surface with the marks. The
+/// surface's height comes from the object, because a photo does not show it.
 ///
 /// # Errors
 /// The ray through the grasp does not meet that surface, or the part is wider than the hand opens.

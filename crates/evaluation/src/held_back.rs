@@ -19,7 +19,8 @@ use crate::statistics::{Share, wilson_interval};
 const FIRST: u64 = 1 << 40;
 /// Number of samples, three quarters of which contain the part. Chosen to save time: a sample takes 0.15 s on one core.
 const COUNT: u64 = 24;
-/// Maximum size of a sample, in pixels: that of the paper's pictures. Larger samples take longer.
+/// Maximum number of pixels of a sample: that of the pictures in the paper that this project implements. Larger samples
+/// take longer.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
 /// Range of the part's size in the samples, relative to the photo, for a model that knows its part's size.
 const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
@@ -205,8 +206,8 @@ impl HeldBackFigures {
         )
     }
 
-    /// The results as JSON: fractions as count and total, their intervals, and the errors, in pixels of the samples
-    /// and, if the model knows lengths, in millimetres.
+    /// The results as JSON: fractions as count and total, their intervals, and the errors. Distances are in pixels of
+    /// the samples, in percent of the diagonal and, if the model knows lengths, in millimetres.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,

@@ -24,7 +24,7 @@ struct MotionDrawing {
     width_px: u32,
     /// Frames per second.
     fps: f64,
-    /// Maximum number of pictures of a motion; a longer motion is shown faster.
+    /// Approximate maximum number of pictures; longer motions are shown faster.
     max_frames: f64,
 }
 

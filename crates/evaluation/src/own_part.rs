@@ -10,13 +10,13 @@ use thiserror::Error;
 const ASSUMED_DENSITY: f64 = 1500.0;
 /// Friction coefficient of a part for which none is given: that of most shipped parts.
 const ASSUMED_FRICTION: f64 = 0.6;
-/// Approximate resolution of the wrist camera on the table, in pixels per metre; a finer photo would be compared with
-/// coarser pictures.
+/// Maximum resolution of the model's photo, in pixels per metre: approximately that of the wrist camera on the table. A
+/// finer photo is reduced to it.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
 /// Maximum assumed mass of a body, in kg: the maximum load of the arm.
 const MAX_ASSUMED_KG: f64 = 3.0;
 
-/// A part made from a model, with the model for the simulated camera.
+/// A simulated part made from a grasp model, and the model with the lengths that the simulated camera needs.
 pub struct OwnPart {
     pub object: ObjectSpec,
     pub model: GraspModel,

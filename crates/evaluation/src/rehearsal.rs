@@ -1,7 +1,7 @@
 //! Grasp attempts with a model in the simulated workcell, and their results.
 //!
 //! The arm gets its grasps in the same way as a real arm ([`ModelFinder`]): from the picture, the camera's pose on the
-//! flange, and the model's lengths. From the simulator it gets only facts that the owner of a cell knows: the
+//! flange, and the model's lengths. From the simulator it gets only facts that the owner of a workcell knows: the
 //! intrinsics, the hand-eye calibration, the table's height, and the heights of marks and grasp.
 
 use std::ops::ControlFlow;
@@ -42,10 +42,10 @@ pub struct Rehearsal<'a> {
     pub verification: Verification,
     /// Errors of the robot's settings and of the workcell.
     pub errors: RehearsalErrors,
-    /// The wrist camera; `None` for the paper's.
+    /// The wrist camera; `None` for that of the paper.
     pub camera: Option<PinholeCamera>,
-    /// The place where parts are put down; the attempts use its cells one after another. Apart from the part, the table
-    /// is then empty.
+    /// The place where the part is put down after each grasp; `None` for grasps only. With a place, the table has no
+    /// distractors.
     pub place: Option<RehearsedPlace>,
 }
 
@@ -54,14 +54,14 @@ pub struct Rehearsal<'a> {
 pub struct RehearsedPlace {
     /// The place.
     pub place: Place,
-    /// A single cell to use; `None` uses all cells one after another.
+    /// A single cell of the place to use; with `None`, all its cells are used one after another.
     pub cell: Option<u32>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
 }
 
 impl RehearsedPlace {
-    /// A place of a workcell; `text` may name one of its cells.
+    /// A place of a workcell. `text` is `NAME`, or `NAME:CELL` for one cell of the place.
     ///
     /// # Errors
     /// The place or the cell is unknown.
@@ -124,7 +124,7 @@ impl Rehearsed {
             .collect()
     }
 
-    /// Whether the part was not found in any attempt.
+    /// Whether every attempt failed because the part was not found.
     pub fn found_nothing(&self) -> bool {
         !self.attempts.is_empty()
             && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == GraspStep::Detect as usize)

@@ -23,7 +23,7 @@ impl TaughtFile {
     /// Teaches a model; `observe` may end teaching early.
     ///
     /// # Errors
-    /// The errors of [`teach`].
+    /// The errors of [`teach`], of [`GraspModel::to_bytes`] and of [`GraspModel::from_bytes`].
     pub fn teach(
         demonstrations: &[Demonstration],
         options: &TeachOptions,

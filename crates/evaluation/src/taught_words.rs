@@ -18,8 +18,8 @@ pub fn too_wide(model: &GraspModel) -> Option<String> {
     })
 }
 
-/// Warnings about jaws that open as wide as the box because there is no outline. If the part lies obliquely in the box,
-/// a smaller opening is enough.
+/// Warnings about jaws that open as wide as the box because neither an outline nor a jaw width is marked. If the part
+/// lies obliquely in the box, a smaller opening is enough.
 pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
     let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
         let annotation = &demonstration.annotation;

@@ -19,7 +19,7 @@ use sdg_fci::{FciError, RobotError, RobotErrors, read_message};
 
 const TIMEOUT: Duration = Duration::from_millis(300);
 
-/// Plays a robot that accepts one client and answers with the request's number plus `beside`. Returns the stream and
+/// Acts as a robot that accepts one client and answers with the request's number plus `beside`. Returns the stream and
 /// the address for states.
 fn welcome(listener: &TcpListener, beside: u32) -> (TcpStream, SocketAddr) {
     let (mut stream, client) = listener.accept().unwrap();
@@ -41,7 +41,7 @@ fn connect(listener: &TcpListener) -> Result<Robot, FciError> {
     Robot::connect(&listener.local_addr().unwrap().to_string(), &config)
 }
 
-/// Reads a state while a played robot sends state `first`, then the states `numbers` repeatedly, from the address
+/// Reads a state while a test robot sends state `first`, and then repeatedly the states `numbers` from the address
 /// `from`.
 fn read_while_sent(first: u64, numbers: &'static [u64], from: Ipv4Addr) -> Result<u64, FciError> {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();

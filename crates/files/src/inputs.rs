@@ -74,7 +74,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     extend(path, None, bytes)
 }
 
-/// Like [`write`], for a file that may be `own`, which this process has read in order to keep its contents.
+/// Like [`write`], but it may replace `own`, a file that this process has read in order to keep its contents.
 ///
 /// # Errors
 /// The errors of [`write`].
@@ -92,7 +92,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check_extendable(path, None)
 }
 
-/// Like [`check_writable`], for a file that may be `own`, as in [`extend`].
+/// Like [`check_writable`], but `path` may be the file `own`, as in [`extend`].
 ///
 /// # Errors
 /// The errors of [`check_writable`].

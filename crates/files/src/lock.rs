@@ -15,7 +15,7 @@ pub enum Access {
     Shared,
 }
 
-/// The lock of a file, held until it is dropped. A file system without locks grants the lock to every process, so a
+/// The lock of a file, held until it is dropped. On a file system without locks, every process gets the lock, so a
 /// single process can always work.
 #[derive(Debug)]
 pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
@@ -47,8 +47,8 @@ fn try_lock(file: File, access: Access) -> (File, bool) {
     (file, !matches!(locked, Err(TryLockError::WouldBlock)))
 }
 
-/// A lock for writing a file, in a hidden file beside it that names the holder. The hidden file is removed at the end;
-/// if it remains, the next holder takes it over.
+/// An exclusive lock for writing a file. A hidden file beside it carries the lock and names the holder. The hidden file
+/// is removed at the end; if it remains, the next holder takes it over.
 #[derive(Debug)]
 pub struct WriterLock {
     path: PathBuf,
@@ -59,7 +59,8 @@ impl WriterLock {
     /// Takes the lock for a file that will be written; `None` if the folder is not writable.
     ///
     /// # Errors
-    /// [`FileError::Held`] if another process holds it.
+    /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if the holder's name cannot be
+    /// written.
     pub fn take(written: &Path) -> Result<Option<Self>> {
         let name = written.file_name().unwrap_or_default().to_string_lossy();
         let path = written.with_file_name(format!(".{name}.lock"));

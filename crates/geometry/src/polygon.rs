@@ -75,8 +75,8 @@ impl Polygon {
         })
     }
 
-    /// The fraction of this area that lies inside another polygon, in `[0, 1]`, from a grid of 16 × 16 points over its
-    /// box.
+    /// The fraction of this polygon's area that lies inside another polygon, in `[0, 1]`, from a grid of 16 × 16 points
+    /// over this polygon's box.
     pub fn share_inside(&self, other: &Self) -> f64 {
         const SIDE: u32 = 16;
         let bounds = self.bounds();

@@ -16,7 +16,7 @@ impl Polygon {
         let mut neighbours: Vec<[usize; 2]> = (0..count).map(|i| [(i + count - 1) % count, (i + 1) % count]).collect();
         let area = |i: usize, [before, after]: [usize; 2]| {
             let at = self.vertices[i];
-            // The bits of floats without a sign have the order of the floats.
+            // The bits of non-negative floats have the order of the floats.
             (self.vertices[before] - at).perp(&(self.vertices[after] - at)).abs().to_bits()
         };
         let mut is_kept = vec![true; count];

@@ -1,9 +1,9 @@
 //! The rate of false alarms of model S on generated pictures without the part: `false_alarms [PARTS] [PICTURES]
 //! [SEED]`.
 //!
-//! Teaches each of PARTS (100) generated parts and searches PICTURES (25) of 640×480 pixels with other objects but no
-//! look-alikes under each of four conditions. SEED (4041) decides the parts; nothing was fitted on parts of seed 4041.
-//! The same arguments give the same output.
+//! Teaches each of PARTS (100; rounded up to a multiple of 5) generated parts. Searches PICTURES (25) of 640×480
+//! pixels, with other objects but no look-alikes, under each of four conditions. SEED (4041) decides the parts; nothing
+//! was fitted on parts of seed 4041. The same arguments give the same output.
 
 mod drawn;
 
@@ -16,7 +16,7 @@ use sdg_part_generator::Condition;
 
 use crate::drawn::{Result, absent, draw_parts};
 
-/// Conditions under which other parts are visible.
+/// Conditions under which other objects are visible.
 const CONDITIONS: [Condition; 4] = [Condition::Nominal, Condition::Clutter, Condition::Dark, Condition::Glare];
 /// Parts drawn together: all of them are in memory with their pictures.
 const PARTS_AT_ONCE: usize = 5;

@@ -1,12 +1,12 @@
-//! Fits the constants of the standard errors of a grasp in the plan view on generated parts, and prints them beside the
-//! shipped constants. Changes no file.
+//! Fits, on generated parts, the constants that determine the standard errors of a grasp in the plan view, and prints
+//! them beside the shipped constants. Changes no file.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`
 //!
-//! Generates PARTS parts (240), half of them for fitting and half held out, teaches model S on each in the plan view of
-//! its photo's camera, and searches for it in one picture of each of the generator's conditions with the part. Half of
-//! the parts have pictures of 640x480, the others of 320x240. The constants minimise the pinball loss of the logarithm
-//! of the errors at the 68 % quantile, with equal weight for each condition.
+//! Generates PARTS parts (240), half of them for fitting and half held out, and teaches model S on each in the plan
+//! view of its photo's camera. Searches for it in one picture with the part under each of the generator's conditions.
+//! Half of the parts have pictures of 640x480 pixels, the others of 320x240. The constants minimise the pinball loss of
+//! the logarithm of the errors at the 68 % quantile, with equal weight for each condition.
 
 use std::ops::ControlFlow;
 

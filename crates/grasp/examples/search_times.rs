@@ -1,8 +1,8 @@
 //! Search times of model S: `search_times MODEL [--repeat N] [--size-tolerance LOW-HIGH] [--region X,Y,W,H] PICTURE…`.
 //!
-//! Prints, for each picture, the median of its repeats in milliseconds, from decoded picture to verdict, and the number
-//! of accepted detections; then the median over the pictures. Each repeat goes through all pictures, so that a short
-//! load of the machine does not affect one picture alone.
+//! Prints for each picture the median time of its repeats in milliseconds, from the decoded picture to the verdict, and
+//! the numbers of accepted and of all detections; then the median time over the pictures. Each repeat goes through all
+//! pictures, so that a short load of the machine does not affect one picture alone.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Teaches from a photo and its annotation without the command line: `teach IMAGE ANNOTATION OUT`.
+//! Teaches from a photo and its annotation with the library alone, without the program `sdg`: `teach IMAGE ANNOTATION
+//! OUT`.
 
 use std::ops::ControlFlow;
 

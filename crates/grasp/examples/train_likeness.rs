@@ -3,9 +3,10 @@
 //! `cargo run --release -p sdg-grasp --example train_likeness -- [--parts N] [--held-out N] [--epochs N] [--seed S]
 //! [--pairs FILE] [--rendered FILE [--hold-out]] [--out FILE]`
 //!
-//! Generates N training parts (700) and held-out parts (100), in turn 20 parts in pictures of 640×480 pixels and 20 in
-//! pictures of 320×240. Searches their pictures, and trains on the correct and wrong matches for 40 epochs. FILE of
-//! `--pairs` stores the matches; parts that the file already contains are not generated again. About a third of each
+//! Generates N training parts (700) and held-out parts (100): alternately 20 parts with pictures of 640×480 pixels and
+//! 20 with pictures of 320×240. Searches their pictures, and trains on the correct and wrong matches for 40 epochs.
+//! `--pairs FILE` stores the matches; parts that the file already contains are not generated again. About a third of
+//! each
 //! batch comes from the FILE of `--rendered`, which the example `rendered_pairs` of sdg-base-weights writes; with
 //! `--hold-out` every fourth of its parts is used for the report instead of training. Writes `likeness.safetensors`,
 //! half precision. The same arguments give the same file.

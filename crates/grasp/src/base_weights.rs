@@ -105,7 +105,7 @@ impl BaseWeights {
         }
     }
 
-    /// The frozen norms of the backbone for which these weights have all four parts.
+    /// The frozen norms of the backbone as scale and shift, for each norm of which these weights have all four parts.
     fn folded_norms(&self, eps: Option<f64>) -> StateDict {
         const PARTS: [&str; 4] = ["weight", "bias", "running_mean", "running_var"];
         let mut norms = StateDict::new();

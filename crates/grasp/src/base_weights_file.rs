@@ -60,7 +60,7 @@ impl BaseWeightsFile {
         safetensors_file::write(&metadata, &tensors)
     }
 
-    /// Whether a safetensors file with this metadata is one of this format.
+    /// Whether a safetensors file with this metadata has this format, in any version.
     pub fn is_described_by(metadata: &BTreeMap<String, String>) -> bool {
         metadata.get("format").is_some_and(|format| format.starts_with(FORMAT_NAME))
     }

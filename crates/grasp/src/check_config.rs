@@ -99,18 +99,18 @@ pub struct Term {
 
 /// The weights of the evidence; see [`crate::Contributions`] for the terms.
 ///
-/// Most terms were fitted on 160 generated parts, which exclude shipped parts, photographs and the training parts of
-/// the likeness: `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score`
+/// Most terms were fitted on 160 generated parts, none of which is a shipped part, a photographed part or a training
+/// part of the likeness: `fit_constants --parts 160 --size 640x480,320x240 --seed 11 --only score`
 /// (docs/decisions/007-score.md). The terms from `details` to `mirror` come from nine tuned sets of datasets/split.toml
 /// and 16 rendered parts (docs/decisions/025-acceptance.md, 026-details.md). Ranges, hue, size and bias were set by
 /// hand; with these ranges only details, table, added and mirror can each reject a pose regardless of the other terms.
-/// The network's weight was fitted on models C of ten generated parts: only a missing proposal counts, because a
-/// network also proposes look-alikes.
+/// The network's weight was fitted on models C of ten generated parts. The network's output counts only against a pose,
+/// because a network also detects look-alikes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ScoreConfig {
-    /// Whether pictures have known lengths. The size is then compared with the demonstration's, and otherwise with the
-    /// size of the best detection in the picture.
+    /// Whether pictures have known lengths. If they do, a detection's size is compared with the demonstration's,
+    /// otherwise with the size of the best detection in the picture.
     pub is_size_known: bool,
     /// Log-odds if all evidence is neutral.
     pub bias: f64,
@@ -143,8 +143,8 @@ pub struct ScoreConfig {
     pub added: Term,
     /// Term of the difference by which [`sdg_shape::CloseLook::mirrored`] fits better than the photo.
     pub mirror: Term,
-    /// Term of the network's log-likelihood ratio: ln of the likelihood of the network's output on the part over its
-    /// likelihood elsewhere.
+    /// Term of the network's log-likelihood ratio: ln of the ratio of two likelihoods of the network's output, on the
+    /// part and elsewhere.
     pub network: Term,
 }
 
@@ -152,7 +152,7 @@ impl ScoreConfig {
     /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
-    /// The weights for pictures with known lengths, where another size outweighs all but the strongest other evidence.
+    /// The weights for pictures with known lengths, where a wrong size outweighs all but the strongest other evidence.
     pub(crate) fn of_known_size(self) -> Self {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
@@ -227,9 +227,9 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
     Term { weight, neutral, range: [low, high] }
 }
 
-/// Term of the squared ln of a size over the demonstration's size. A refined pose has a size error of about 2.5 % if a
-/// slanted view shows a part's walls. The weight is half of the inverse square of that error; differences above 10 %
-/// count as 10 %. Chosen by hand from six rendered pictures.
+/// Term of the squared ln of the ratio of a size to the demonstration's. A refined pose has a size error of about 2.5 %
+/// if a slanted view shows a part's walls. The weight is half of the inverse square of that error; differences above
+/// 10 % count as 10 %. Chosen by hand from six rendered pictures.
 const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {

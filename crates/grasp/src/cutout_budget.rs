@@ -1,5 +1,5 @@
-//! Limits of a model's demonstrations, in teaching and in files: otherwise a forged file of kilobytes could take
-//! gigabytes or minutes.
+//! Limits of a model's demonstrations, in teaching and in files: otherwise the reading of a forged file of kilobytes
+//! could take gigabytes of memory, or minutes.
 
 use image::RgbImage;
 use sdg_demonstration::ImageLimits;
@@ -23,7 +23,8 @@ pub(crate) fn check_count(count: usize) -> Result<()> {
     }
 }
 
-/// The number of pixels that the remaining cut-outs of a model may have; all together at most as many as one picture.
+/// The number of pixels that the remaining cut-outs of a model may have. All cut-outs together may have as many pixels
+/// as one picture.
 #[derive(Debug)]
 pub(crate) struct CutoutBudget {
     pixels: u64,
@@ -36,7 +37,7 @@ impl Default for CutoutBudget {
 }
 
 impl CutoutBudget {
-    /// The size of the next cut-out: at most that of its marks and a margin.
+    /// The maximum size of the next cut-out: that of its marks and a margin, within the budget.
     pub(crate) fn limits(&self, marks: &TaughtMarks) -> ImageLimits {
         let long = marks.bbox.width().max(marks.bbox.height());
         // A cut-out may have been enlarged with its margin, if another photo shows the part larger.
@@ -46,7 +47,7 @@ impl CutoutBudget {
             ends.iter().fold(to, |to, end| to.max(end[axis])) - ends.iter().fold(from, |from, end| from.min(end[axis]))
         };
         let [width, height] = [side(0, marks.bbox.x1, marks.bbox.x2), side(1, marks.bbox.y1, marks.bbox.y2)];
-        // Numbers that are not finite or too large become the budget.
+        // Infinite or too large numbers become the budget.
         ImageLimits { max_pixels: (((width + margin) * (height + margin)) as u64).min(self.pixels) }
     }
 

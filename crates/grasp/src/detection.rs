@@ -19,8 +19,8 @@ use crate::verification::PlacedDemonstration;
 pub struct GraspDetection {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's score, in `[0, 1]`; zero without a proposal of the network (model S, and parts found by the search
-    /// only).
+    /// The network's score, in `[0, 1]`; zero if no candidate of the network led to the detection (model S, and parts
+    /// found by the search only).
     pub network_score: f64,
     /// Agreement of demonstration and image at the pose, in `[0, 1]`; `None` without verification.
     pub agreement: Option<f64>,
@@ -47,7 +47,7 @@ impl GraspDetection {
     }
 
     /// Whether the part lies in a region of the picture: the region contains the grasp point and at least half of the
-    /// outline's area.
+    /// outline's area (without verification, of the box's area).
     pub fn lies_in(&self, region: &SearchRegion) -> bool {
         let bounds = || Polygon::from_box(&self.bbox);
         region.has(&self.grasp.center(), &self.outline.clone().unwrap_or_else(bounds))

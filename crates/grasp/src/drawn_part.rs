@@ -1,4 +1,4 @@
-//! A drawn part for tests: an L with a bright foot and a hole, on a dim ramp.
+//! A drawn part for tests: an L with a bright foot and a hole, on a dark background with a brightness gradient.
 
 use std::ops::ControlFlow;
 
@@ -52,7 +52,7 @@ pub(crate) fn line() -> GraspLine {
     GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0))
 }
 
-/// The part's photo of this size, and the marks.
+/// A photo of the part, of this size, and its marks.
 pub(crate) fn demonstration(size: [u32; 2]) -> Demonstration {
     let outline = outline();
     let annotation = Annotation {

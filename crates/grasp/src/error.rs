@@ -183,7 +183,7 @@ pub enum GraspError {
          give it more time, or a demonstration with a clearer outline"
     )]
     NotLearnt {
-        /// Samples in which the demonstration, laid over the network's proposal, lies on the part.
+        /// Samples in which the demonstration, laid over the image at the network's candidate, lies on the part.
         hits: usize,
         positives: usize,
         steps: usize,

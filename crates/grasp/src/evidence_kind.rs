@@ -74,8 +74,8 @@ impl EvidenceKind {
         }
     }
 
-    /// Whether this evidence has places of difference to show. Such evidence is also listed as an objection if it
-    /// supports the part clearly less than it could.
+    /// Whether this evidence comes from differences that can be shown in the picture. Such evidence is also listed as
+    /// an objection if it supports the part clearly less than it could.
     pub(crate) fn is_local(self) -> bool {
         !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
     }

@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Five models, by their letters ([`ModelKind`]): the paper's four models, which differ in the output of their network
-//! (a box and its crop, keypoints, a mask), and one without a network, taught in a second. Every detection of a network
-//! is converted to a pose of the demonstration, refined by laying the demonstration over the image, and scored
-//! ([`Verification`]).
+//! (a box and its crop, keypoints, a mask), and one without a network, taught in a second. Each box of a network is
+//! converted to a pose of the demonstration. [`Verification`] refines and scores this pose by laying the demonstration
+//! over the image.
 //!
 //! # Legend
 //!
@@ -18,7 +18,7 @@
 //! | image | the picture as given, or the plan view made of it ([`CameraOverTable`]); pixels, y down, the first pixel's centre at (0.5, 0.5) |
 //! | photo | the demonstration's picture, in its pixels |
 //! | cut-out | the crop of the photo around the part that the model stores, in its pixels |
-//! | view, working | image and cut-out halved or resized for one range of sizes; the search runs in these |
+//! | view, working | the halved image and the resized cut-out for one range of sizes; the search compares these |
 //! | `a_from_b` | a transform of coordinates from frame b to frame a; poses are `image_from_cutout`, a similarity |
 //! | candidate | a box of the network converted to a pose, not yet verified |
 //! | evidence | measurements at a pose (edges, surface, hue, visible fraction, size …), each of which adds log-odds to the score |
@@ -28,8 +28,8 @@
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!
-//! This crate deliberately has no files, robot or simulator. Detection has no clock and no threads except rayon's: the
-//! same code runs in a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
+//! This crate deliberately uses no files, robot or simulator. Detection uses no clock and no threads except rayon's:
+//! the same code runs in a browser. Without the feature `teach` no autodiff, optimiser or augmentation is compiled.
 //!
 //! From the bytes of a model and of an image to a grasp:
 //!

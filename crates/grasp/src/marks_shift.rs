@@ -10,7 +10,7 @@
 //! possible η, which form a line. Since no camera points exactly down, shifts beside this line are also compared. A
 //! shift is accepted if its agreement is clearly better than that of the outline's pose. Fitted on the tuned sets of
 //! datasets/split.toml and base-weights/physical/split.toml: the marks of 304 of 312 parts lie within 4 % of the
-//! diagonal, and those of 268 without a shift (docs/decisions/027-heights-and-slants.md).
+//! diagonal; without a shift, those of 268 parts (docs/decisions/027-heights-and-slants.md).
 
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;

@@ -27,8 +27,8 @@ use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot, search};
 
-/// Minimum length of the shorter side of an image. Chosen by hand, not measured: a level of the pyramid has at least 24
-/// pixels per side.
+/// Minimum length of the shorter side of an image, in pixels. Chosen by hand, not measured: larger than the minimum
+/// side of a pyramid level, 24 pixels.
 const MIN_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.
@@ -269,7 +269,7 @@ impl GraspModel {
         Ok((self.judged(sightings), slant))
     }
 
-    /// The network's proposals, and the result of `work`, which is done meanwhile.
+    /// The network's boxes and candidates, and the result of `work`, which is done meanwhile.
     #[cfg(not(target_arch = "wasm32"))]
     async fn beside_network<R: Send>(
         &self,
@@ -281,7 +281,7 @@ impl GraspModel {
         sdg_shape::parallel::join(work, || read_sync(network.proposals_async(image, shot.size, &self.demonstrations)))
     }
 
-    /// The network's proposals, and the result of `work`. A browser has one thread.
+    /// The network's boxes and candidates, and the result of `work`, one after the other: a browser has one thread.
     #[cfg(target_arch = "wasm32")]
     async fn beside_network<R>(
         &self,

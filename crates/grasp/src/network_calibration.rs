@@ -31,9 +31,9 @@ const MIN_SPREAD: f64 = 0.3;
 const FACING_PERCENT: f64 = 10.0;
 /// Distance of this percentile of a normal distribution from the median, in standard deviations.
 const FACING_DEVIATIONS: f64 = 1.281_551_6;
-/// Distance of the threshold from the median of the wrong scores over its distance from the median of the correct ones,
-/// each in deviations. With normal distributions, 5 % of the wrong scores are accepted when 10 % of the correct ones
-/// are refused (1.645 over 1.282).
+/// Ratio of two distances of the threshold, each in deviations: from the median of the wrong scores, and from that of
+/// the correct ones. With normal distributions, 5 % of the wrong scores are accepted when 10 % of the correct ones are
+/// refused (1.645 / 1.282).
 const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
 /// Bounds of the slope, so that a few scores give neither a step nor a flat line. Derived from this reason, not
 /// measured.

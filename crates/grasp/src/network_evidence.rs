@@ -1,7 +1,7 @@
-//! Log-odds of a place from a network's proposal, or from its absence.
+//! Log-odds of a place from a network's box there, or from the absence of a box.
 //!
-//! A network that was taught for half a minute also detects other objects and misses parts, so that neither a proposal
-//! nor its absence is strong evidence. The strength of this evidence is measured on held-out samples during teaching:
+//! A network that was taught for half a minute also detects other objects and misses parts, so that neither a box nor
+//! its absence is strong evidence. The strength of this evidence is measured on held-out samples during teaching:
 //!
 //! ```text
 //! held-out samples with the part ── places on the part ────────┐
@@ -19,7 +19,7 @@ use crate::network_calibration::{NetworkCalibration, log_odds};
 #[cfg(any(feature = "teach", test))]
 const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
-/// Counts of the network's outputs (no proposal, unsure, sure) on the part and on other objects.
+/// Counts of the network's outputs (no box, unsure, sure) on the part and on other objects.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NetworkEvidence {
     on_part: [u32; 3],
@@ -31,7 +31,7 @@ pub(crate) struct NetworkEvidence {
 }
 
 impl NetworkEvidence {
-    /// Counts the network's scores on the part and on other objects; a score is 0 without a proposal.
+    /// Counts the network's scores on the part and on other objects; a score is 0 without a box.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &NetworkCalibration) -> Self {
         let mut evidence = Self { margin: PICTURES_SCORE_LOWER_BY, ..Self::default() };
@@ -53,7 +53,7 @@ impl NetworkEvidence {
         }
     }
 
-    /// ln of the likelihood of the score's class on the part over its likelihood elsewhere. Every count is increased by
+    /// ln of the ratio of two likelihoods of the score's class, on the part and elsewhere. Every count is increased by
     /// one.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &NetworkCalibration) -> f64 {
         let class = self.class(score, calibration);

@@ -5,8 +5,8 @@
 //!                                ├─ the part has the same size in both, as small as possible
 //! picture ─ halved some times ───┘
 //! ```
-//! In a telephone's photo a part is a thousand pixels long; at a quarter of the resolution the pose is as accurate as
-//! at the full one, and takes a sixteenth of the time.
+//! In a telephone's photo, a part can be a thousand pixels long. At a quarter of the resolution, its pose is as
+//! accurate as at the full one, and the search takes a sixteenth of the time.
 
 use std::sync::{Arc, Mutex};
 

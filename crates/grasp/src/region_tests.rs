@@ -39,8 +39,8 @@ fn refused(model: &GraspModel, picture: &RgbImage) -> String {
     model.detect(picture, Verification::ByShape).unwrap_err().to_string()
 }
 
-/// At every position of a region that is moved across the picture, the search finds the same parts as the search of the
-/// whole picture, and nothing else.
+/// A region is moved across the picture. At every position, the search of the region finds exactly those parts in the
+/// region that the search of the whole picture finds there.
 #[test]
 fn in_a_region_is_found_what_the_whole_picture_has_there() {
     let (model, picture) = (drawn_part::model(SIZE), picture());

@@ -25,7 +25,7 @@ impl ScoreCalibration {
         resemblance: crate::check_config::ScoreConfig::DEFAULT.resemblance.neutral,
     };
 
-    /// The log-likelihood ratio of a place from the network's score there (0 without a proposal); `None` without the
+    /// The log-likelihood ratio of a place from the network's score there (0 without a box); `None` without the
     /// network's evidence.
     pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {
         Some(self.evidence?.log_likelihood_ratio(network_score, &self.network))

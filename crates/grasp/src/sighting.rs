@@ -1,4 +1,4 @@
-//! Places where the part may be, from the network's proposals and from the search.
+//! Places where the part may be, from the network's candidates and from the search.
 
 use sdg_shape::parallel;
 
@@ -12,7 +12,7 @@ use crate::verification::{PlacedDemonstration, SearchedImage, verify};
 /// A place where the part may be, before it is scored.
 pub(crate) struct Sighting<'a> {
     pub(crate) placed: PlacedDemonstration<'a>,
-    /// The network's score; 0 without a proposal of the network.
+    /// The network's score; 0 if the network has no box there.
     pub(crate) network_score: f64,
     /// The network's scores of the keypoints; empty for a place found by the search.
     pub(crate) keypoint_scores: Vec<f64>,
@@ -25,8 +25,8 @@ pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'
     sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
 }
 
-/// All sightings in an image: first the network's proposals, then `found`, the matches of the search. A place may occur
-/// twice.
+/// All sightings in an image: first the network's candidates, then `found`, the matches of the search. A place may
+/// occur twice.
 pub(crate) fn sightings<'a>(
     proposals: &Proposals,
     found: &[PlacedDemonstration<'a>],
@@ -36,7 +36,7 @@ pub(crate) fn sightings<'a>(
     proposed.into_iter().flatten().chain(found.iter().map(|placed| searched(placed, proposals))).collect()
 }
 
-/// As [`sightings`], but with the network's proposals only down to the first correct one: verifying the others takes
+/// As [`sightings`], but with the network's candidates only down to the first correct one: verifying the others takes
 /// longer than the search and does not change the network's score on the part.
 #[cfg(feature = "teach")]
 pub(crate) fn sightings_to_first<'a>(
@@ -80,8 +80,8 @@ fn searched<'a>(placed: &PlacedDemonstration<'a>, proposals: &Proposals) -> Sigh
     }
 }
 
-/// The pose found by the search on the candidate's part, if its agreement is so high that refinement of the candidate's
-/// pose would converge to it; that refinement took most of model C's time.
+/// The pose found by the search on the candidate's part, if its agreement is so high that the refinement of the
+/// candidate's pose would converge to it. This saves the refinement, which took most of model C's time.
 fn found_already<'f, 'a>(
     candidate: &PoseCandidate,
     found: &'f [PlacedDemonstration<'a>],

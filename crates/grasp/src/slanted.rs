@@ -4,8 +4,9 @@
 //! ```text
 //! level search ─ best places ─ their shortening ─ slant ─ rectified picture ─ search ─ better? ─ transformed back
 //! ```
-//! All parts lie on one plane, so that a few sure places determine the slant for all. A single shortened part does not
-//! show which side of the slant is the far one; the slant with the better agreement of place and photo is used.
+//! A place is a placed demonstration of the level search. All parts lie on one plane, so that a few sure places
+//! determine the slant for all. A single shortened part does not show which of its sides is farther from the camera; of
+//! the two possible slants, the one with the better agreement of the rectified place with the photo is used.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -20,39 +21,41 @@ use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usu
 const NUM_SLANT_PLACES: usize = 4;
 /// Minimum agreement of a used place. Chosen by hand to save time.
 const MIN_AGREEMENT: f64 = 0.25;
-/// Minimum fraction of edges on crests; a place below it carries no information. Chosen by hand.
+/// Minimum fraction of a place's edge points on crests of the gradient; a place below it carries no information. Chosen
+/// by hand.
 const MIN_CONSENSUS: f64 = 0.3;
 /// Standard deviation of a place's ln shortening about that of the slant. Chosen by hand.
 const SHORTENING_NOISE: f64 = 0.12;
 /// Minimum tilt in radians: a smaller one shortens by less than 3 % and is ignored.
 const MIN_TILT: f64 = 0.24;
-/// Minimum decrease of the cost by a slant, relative to a level camera: less is noise of the fits. Chosen by hand to
-/// save time; the agreement of the places decides.
+/// Minimum decrease of the cost from a level camera to a slant: a smaller decrease is noise of the fits. Chosen by hand
+/// to save time, because the agreement of the places is checked afterwards.
 const MIN_EXPLAINED: f64 = 0.1;
-/// Minimum gain of agreement over the level view: first of the best place, then of the sum over accepted detections.
-/// For places seen by a camera slanted by 30° the best gains 0.07 to 0.16, for a level camera at most 0.02 (tuned
-/// sets).
+/// Minimum gain of agreement over the level view: first of the place with the largest gain, then of the sum over the
+/// accepted detections. The largest gain of a place is 0.07 to 0.16 for a camera slanted by 30°, and at most 0.02 for a
+/// level camera (tuned sets of datasets/split.toml).
 const SLANT_GAIN: f64 = 0.03;
-/// Number of places that can determine the tilt, its direction and the lens, three unknowns: each place gives two
-/// equations.
+/// Minimum number of places on different parts for three unknowns: the tilt, its direction and the focal length. Each
+/// place gives two equations.
 const SURE_PLACES: usize = 3;
-/// Focal lengths relative to the usual one that are also tried if they explain the places: fields of view of 70°, as in
-/// most telephones, and of 25°.
+/// Further focal lengths, relative to the usual one; they are used if they make a slant certain ([`UNEXPLAINED`]). The
+/// fields of view are 70°, as in most telephones, and 25°.
 const OTHER_LENSES: [f64; 2] = [0.65, 2.0];
 /// A slant is certain if its cost is at most this fraction of the level camera's cost. With three or more places the
 /// fraction is 0.004 to 0.05 for the photographed clips at 20°, and at least 0.26 for a level camera (tuned sets).
 const UNEXPLAINED: f64 = 0.12;
-/// Minimum score in the rectified picture if nothing is accepted in the picture itself: a slant can also make another
-/// part, mainly a longer one, similar to the photo. Without this minimum, 7 instead of 3 of the tuned sets' 58 pictures
-/// without the part would have a false alarm.
+/// Minimum score in the rectified picture if nothing is accepted in the picture itself: the rectification can also make
+/// another part, mainly a longer one, similar to the photo. Without this minimum, 7 instead of 3 of the tuned sets' 58
+/// pictures without the part would have a false alarm.
 const SURE: f64 = 0.9;
-/// Maximum distance of the level picture's border from its centre, in sides of the picture.
+/// Maximum distance of the level picture's border from the mapped centre of the picture, in widths and heights of the
+/// picture.
 const MAX_REACH: f64 = 0.75;
-/// Margin of the rectified area around a place, in sides of the place's box.
+/// Margin of the rectified area around a place, relative to the longer side of the place's box.
 const MARGIN: f64 = 0.2;
 
-/// Whether the detections in the rectified picture explain more than those in the picture itself. Scores cannot decide
-/// this: a slightly wrong pose scores as high as the right one.
+/// Whether the accepted detections in the rectified picture agree clearly better, in sum, than those in the picture
+/// itself. Scores cannot decide this: a slightly wrong pose scores as high as the right one.
 pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
     fn accepted(found: &[Found]) -> impl Iterator<Item = &GraspDetection> {
         found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted())
@@ -63,8 +66,8 @@ pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
 }
 
 /// A shortened place: the position relative to the picture's centre, half of the longer side of its box, the shortening
-/// as a vector that a rotation by 180° does not change, and a weight: the fraction of edge points on crests above the
-/// minimum.
+/// as a vector that a rotation by 180° does not change, and a weight. The weight is the excess of the fraction of edge
+/// points on crests over [`MIN_CONSENSUS`].
 struct Shortened {
     at: Vector2<f64>,
     reach: f64,
@@ -77,8 +80,8 @@ fn shortening_vector(log_ratio: f64, direction: Angle) -> Vector2<f64> {
     log_ratio * Vector2::new(cos, sin)
 }
 
-/// The slant at which the best places would look as in the photo; `None` if the camera may be level. `shot` is that of
-/// a level camera.
+/// The slant at which the best places would look as in the photo; `None` if the camera may be level. `shot` assumes a
+/// level camera.
 pub(crate) fn suggested_slant(
     picture: &RgbImage,
     shot: &Shot,
@@ -101,7 +104,7 @@ pub(crate) fn suggested_slant(
     let shortened: Vec<Shortened> = shortened.into_iter().flatten().collect();
     let level_cost = cost(&Slant::level(usual_focal_px(shot.size)), &shortened)?;
     if level_cost < MIN_EXPLAINED {
-        // Costs are not below 0, so that no slant explains enough.
+        // Costs are at least 0, so that no slant decreases the cost by `MIN_EXPLAINED`.
         return None;
     }
     let usual_px = usual_focal_px(shot.size);
@@ -162,7 +165,7 @@ fn likely_slants(focal_px: f64, shortened: &[Shortened], most: f64) -> Vec<(f64,
 }
 
 /// The minimum gain of agreement of the best place for a slant, if there are enough places. No gain is required if the
-/// places determine the slant with certainty, since the places of the best agreement are the least shortened ones.
+/// slant is certain, because the places with the best agreement are the least shortened ones and gain little.
 fn required_gain(level_cost: f64, least_cost: f64) -> f64 {
     if least_cost <= UNEXPLAINED * level_cost { 0.0 } else { SLANT_GAIN }
 }
@@ -194,7 +197,7 @@ pub(crate) struct LevelImage {
     slant: Slant,
     /// Width and height of the picture, which may be a window of a larger one.
     size: [u32; 2],
-    /// The shot of the picture, as taken by a level camera.
+    /// The shot of the picture, computed as for a level camera.
     taken: Shot,
     /// The position of the centre of the camera's picture, in pixels of the level picture.
     middle: Vector2<f64>,
@@ -211,7 +214,7 @@ impl LevelImage {
         Some(Self::of(picture, taken, slant, [bounds[0].sup(&-reach), bounds[1].inf(&reach)]))
     }
 
-    /// The level image of the surroundings of some points of the picture.
+    /// The level image of the area around some points of the picture; `None` if a point is near the horizon or beyond.
     pub(crate) fn about(picture: &RgbImage, taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<Self> {
         let [least, largest] = level_bounds(taken, slant, points)?;
         let margin = Vector2::repeat(MARGIN * (largest - least).amax());
@@ -241,8 +244,8 @@ impl LevelImage {
         Some(self.taken.below_camera + seen)
     }
 
-    /// Maps a detection of the level picture to the slanted one; `None` if too little of the detection lies in the
-    /// picture.
+    /// Maps a detection of the level picture to the slanted one; `None` if too little of the detection's box lies in
+    /// the picture, or if one of its points cannot be mapped.
     pub(crate) fn seen(&self, found: Found) -> Option<Found> {
         let Found { detection, placement } = found;
         let points = |all: &[Point2<f64>]| all.iter().map(|point| self.point(point)).collect::<Option<Vec<_>>>();
@@ -269,7 +272,7 @@ impl LevelImage {
         };
         let keypoints: Option<Vec<_>> =
             detection.keypoints.iter().map(|(point, score)| Some((self.point(point)?, *score))).collect();
-        // Tracking continues from the nearest pose without shortening.
+        // Tracking continues from the similarity that fits the shortened outline best.
         let picture_from_level = PlanarSimilarity::fit(&level_outline.vertices, &outline.vertices)?;
         let placement = placement.map(|mut placement| {
             placement.image_from_cutout = picture_from_level.compose(&placement.image_from_cutout);
@@ -281,8 +284,8 @@ impl LevelImage {
     }
 }
 
-/// Smallest and largest coordinates in the level picture of some points of the picture, relative to the picture's
-/// centre.
+/// Smallest and largest coordinates of some points of the picture after their mapping to the level picture, relative to
+/// the picture's centre; `None` if a point is near the horizon or beyond.
 fn level_bounds(taken: &Shot, slant: &Slant, points: &[Point2<f64>]) -> Option<[Vector2<f64>; 2]> {
     let mut bounds = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
     for point in points {
@@ -308,8 +311,8 @@ mod tests {
         Vector2::from(size.map(|side| 0.5 * f64::from(side)))
     }
 
-    /// Brightness at a point of the table, relative to the centre of a dark, rotated plate of 110 × 60 pixels with two
-    /// holes and a printed stripe.
+    /// Brightness of the table or of a dark, rotated plate of 110 × 60 pixels with two holes and a printed stripe.
+    /// `level` is relative to the plate's centre.
     fn color(level: Vector2<f64>) -> f64 {
         let (sin, cos) = 0.6f64.sin_cos();
         let [u, v] = [cos * level.x + sin * level.y, cos * level.y - sin * level.x];
@@ -376,8 +379,8 @@ mod tests {
         teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model
     }
 
-    /// Whether a detection is accepted within `tolerance` pixels and degrees of the plate moved and rotated on the
-    /// table.
+    /// Whether a detection is accepted and differs by less than `tolerance` (pixels and degrees) from the plate, which
+    /// `plate` moves and rotates on the table.
     #[cfg(feature = "teach")]
     fn is_plate(detection: &GraspDetection, slant: &Slant, plate: &Isometry2<f64>, tolerance: f64) -> bool {
         let seen = |u: f64| {

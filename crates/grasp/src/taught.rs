@@ -18,8 +18,8 @@ use crate::{GraspError, NUM_KEYPOINTS};
 /// Margin in pixels around the part, so that gradients at the outline use both sides. Chosen by hand, not measured.
 pub(crate) const MARGIN_PX: f64 = 16.0;
 
-/// Maximum number of vertices of an outline: the time of a model's start grows with it. Vertices of a round part of
-/// 1,000 pixels are then 12 pixels apart, and its edges within 0.04 pixels of the circle.
+/// Maximum number of vertices of an outline: the time of a model's start grows with it. For a round part with a
+/// diameter of 1,000 pixels, vertices are then 12 pixels apart, and edges within 0.04 pixels of the circle.
 const MAX_VERTICES: usize = 256;
 
 /// The cut-out, its marks, and the data that are compared with images.

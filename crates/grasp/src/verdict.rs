@@ -9,10 +9,10 @@
 //! table, rim, added, mirror ────┘  contradictions of the part
 //! ```
 //! Each kind of evidence is wrong in some pictures: gloss spoils edges and surface, a covering hand hides half of the
-//! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, and a pose that all
-//! other evidence supports is accepted. Only these contradictions can each reject it alone: bare table where the part
-//! should be, more edges than the part has, a better fit of its mirror image, and clearly different details. Most
-//! weights come from a logistic regression on generated parts ([`crate::fitting`]).
+//! part, the network also detects other parts. Therefore each kind adds log-odds within bounds, so that a pose is
+//! accepted despite one wrong kind if all other evidence supports it. Only these contradictions can each reject a pose
+//! alone: bare table where the part should be, more edges than the part has, a better fit of its mirror image, and
+//! clearly different details. Most weights come from a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
@@ -24,7 +24,7 @@ use crate::evidence_kind::{Advice, EvidenceKind};
 /// it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Contributions {
-    /// The network's proposal at the pose, or its absence; absent without a network.
+    /// The network's score at the pose, or the absence of a candidate there; `None` without a network.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<f64>,
     /// Agreement of the demonstration's edges with the image.
@@ -41,8 +41,8 @@ pub struct Contributions {
     pub outside: f64,
     /// Resemblance of other objects to this part.
     pub resemblance: f64,
-    /// The log-odds of the small network whose input is photo and picture laid over each other; its minimum if edges
-    /// and surface agree too little for its evaluation.
+    /// The log-odds of the small network whose input is photo and picture laid over each other. If edges and surface
+    /// agree too little, the network is not evaluated, and this is the minimum.
     pub likeness: f64,
     /// The output of the network that distinguishes parts from their look-alikes; 0 if the network is undecided or was
     /// not evaluated.
@@ -78,7 +78,7 @@ impl Contributions {
         ])
     }
 
-    /// The strongest evidence against the part, or the weakest for it.
+    /// The strongest evidence against the part; without evidence against it, the weakest for it.
     fn weakest(&self) -> Option<(EvidenceKind, f64)> {
         self.by_kind().min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -89,8 +89,9 @@ impl Contributions {
         (log_odds < 0.0).then_some(kind)
     }
 
-    /// The evidence against the part: first the strongest objection, then each kind that supports the part clearly less
-    /// than it could with `config`, the greatest loss first.
+    /// The evidence against the part: first the strongest objection, then the kinds whose log-odds are clearly below
+    /// their maximum with `config`, the greatest loss first. A kind without differences that can be shown in the
+    /// picture counts only if its log-odds are below 0.
     pub fn objections(&self, config: &ScoreConfig) -> Vec<EvidenceKind> {
         /// Smaller losses also occur in clear views. Chosen by hand.
         const MIN_LOSS: f64 = 0.5;
@@ -108,7 +109,7 @@ impl Contributions {
     /// The further demonstration, or the setting, that would help if this is the part after all; `light` is the
     /// brightness over that of the demonstration. `None` if neither would help.
     pub(crate) fn advice(&self, light: f64) -> Option<Advice> {
-        // Outside this range of brightness the light differs. Chosen by hand, not measured.
+        // Outside this range of `light` the illumination differs. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
         let on_light = if light < DARKER {
@@ -141,8 +142,7 @@ pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
     /// ln of the size over the nearest nominal size.
     pub(crate) log_size: f64,
-    /// ln of the likelihood of the network's output on the part over its likelihood elsewhere; `None` without a
-    /// network.
+    /// ln of the ratio of two likelihoods of the network's output, on the part and elsewhere; `None` without a network.
     pub(crate) network: Option<f64>,
     /// Mean agreement of other objects with the part.
     pub(crate) resemblance: f64,
@@ -154,9 +154,9 @@ const MIN_RIVALS_SHARE: f64 = 0.03;
 /// Minimum score of the size reference. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
-/// The scores of all detections in one picture and their contributions. If the part's size is unknown, each is first
-/// scored alone, then relative to the size of the best one, since the parts of one picture are equally far from the
-/// camera.
+/// The scores of all detections in one picture and their contributions. If the part's size is unknown, each detection
+/// is first scored alone, then relative to the size of the best one, since the parts of one picture are equally far
+/// from the camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
     let surest = || {
         clues
@@ -186,7 +186,7 @@ pub(crate) fn judge_picture_of_sequence(
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {
     let seen = &clues.evidence;
     let off_size = reference_log_size.map_or(0.0, |reference| (clues.log_size - reference).powi(2));
-    // Without a close look these terms are neutral.
+    // Without a close look these terms contribute 0.
     let closely =
         |term: &Term, value: &dyn Fn(&CloseLook) -> f64| seen.close.map_or(0.0, |close| term.log_odds(value(&close)));
     let contributions = Contributions {
@@ -212,8 +212,9 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
 }
 
-/// The difference by which the rival fits better, weighted by how well the rival fits at all, because a part in other
-/// light or in another roll fits neither photo nor rival; 0 if photo and rival differ too little.
+/// The difference by which the rival (the mirror image) fits better than the photo; 0 if the two differ too little. The
+/// difference is weighted by the fit of the rival, because a part in other light or rolled about its own axis fits
+/// neither.
 pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
     /// The rival has no weight if its fit is below the first value, and full weight above the second value. Chosen on
     /// the tuned sets and parts.
@@ -226,7 +227,7 @@ pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// A close look at the part itself, with another likeness.
+    /// A close look at the part itself, with this likeness.
     pub(crate) fn look(likeness: f64) -> CloseLook {
         CloseLook { likeness, details: Some(1.5), bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
     }

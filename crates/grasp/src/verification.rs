@@ -1,5 +1,5 @@
-//! Verification: the demonstration is laid over the image at a model's proposals and at the search's matches, and
-//! refined.
+//! Verification: the demonstration is laid over the image at the network's candidates and at the search's matches, and
+//! its pose is refined.
 //!
 //! ```text
 //! picture ─ halved for each size that is searched ─── SearchedImage ─┬─ search: the whole picture ──┬─ PlacedDemonstration
@@ -38,8 +38,7 @@ pub(crate) struct Shot {
     pub(crate) below_camera: Point2<f64>,
 }
 
-/// Assumed focal length of a camera, in lengths of the picture's longer side: a field of view of 49°, as in a
-/// telephone. Chosen by hand.
+/// Assumed focal length of a camera, in lengths of the picture's longer side: a field of view of 49°. Chosen by hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 
 /// Assumed focal length of the camera that took a picture of this width and height, in pixels.
@@ -172,7 +171,8 @@ const END_MARGIN_LOG: f64 = 0.02;
 /// If the agreement increases by at least this much beyond an end of the size range, the end stopped the refinement.
 /// Chosen by hand.
 const MIN_GAIN_BEYOND_END: f64 = 0.05;
-/// Minimum agreement for a search of the marks; poses below it are refused anyway. Chosen by hand to save time.
+/// Minimum agreement for a search for the shift of the marks; poses below it are refused anyway. Chosen by hand to save
+/// time.
 const MIN_MARKED: f64 = 0.3;
 
 impl<'a> SizedDemonstration<'a> {
@@ -208,9 +208,9 @@ impl<'a> SizedDemonstration<'a> {
         evidence: Evidence,
     ) -> PlacedDemonstration<'a> {
         let image_from_cutout = self.image_from_cutout(view_from_working);
-        // In a plan view of the marks' plane the marks are not displaced, and nothing would limit a shift along a rod:
-        // in three of 40 pictures of another camera the errors were 7 to 8 mm with a shift, and 2 to 4 mm without
-        // (pendulum, rod end).
+        // A plan view is made for the marks' plane, so that the marks are not displaced, and nothing would limit a
+        // shift along a rod: in three of 40 pictures of another camera the errors were 7 to 8 mm with a shift, and 2 to
+        // 4 mm without (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
         let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
@@ -237,9 +237,9 @@ impl<'a> SizedDemonstration<'a> {
 }
 
 impl SizedDemonstration<'_> {
-    /// The pose of marks above or below the outline, and the agreement and evidence of the part without their
-    /// displacement. `None` if the marks lie in the outline's plane, or if the part agrees less without the
-    /// displacement, because other edges attracted the marks.
+    /// The pose of marks above or below the outline, and the part's agreement and evidence after removal of the marks'
+    /// displacement from the image. `None` if the marks lie in the outline's plane, or if the agreement decreases: then
+    /// other edges attracted the marks.
     fn raised(
         &self,
         view: &View<'_>,
@@ -265,7 +265,7 @@ impl SizedDemonstration<'_> {
     }
 }
 
-/// Every place in the image where a demonstration agrees well enough to be listed.
+/// Every place in the image where a demonstration agrees well enough to be listed, except parts of another size.
 pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstration<'a>> {
     let found_by = |sized: &SizedDemonstration<'a>| {
         let view = &searched.views[sized.view_idx];
@@ -278,12 +278,12 @@ pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstratio
     searched.sized.iter().flat_map(found_by).flatten().collect()
 }
 
-/// Lays the demonstration over the image at the candidate, in both directions, and returns the better pose; `None` if
-/// its size is outside the search range.
+/// Lays the demonstration over the image at the candidate, in both directions, and returns the better pose. `None` if
+/// this pose's size is outside the search range, or if the demonstration is not searched at any size.
 ///
 /// Keypoints give position and orientation well, but a short grasp line gives the scale badly. Therefore the initial
-/// scale makes the outline as large as the detected box. A network that confuses the part's ends is wrong by 180°; the
-/// demonstration distinguishes the ends.
+/// scale is the one at which the outline's box has the area of the detected box, within the search range. A network
+/// that confuses the part's ends is wrong by 180°; the demonstration distinguishes the ends.
 pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>) -> Option<PlacedDemonstration<'a>> {
     let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
     let demonstration = of_it.clone().next()?.demonstration;
@@ -296,7 +296,7 @@ pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>
 }
 
 /// Refines the pose from `start` and from `start` rotated by 180°; returns the pose of better agreement, refined by
-/// edges and surface. `None` if its size is outside the search range, as for another part.
+/// edges and surface. `None` if the size of the refined pose is outside the search range, as for another part.
 fn better_way_round<'a>(
     sized: &SizedDemonstration<'a>,
     start: &PlanarSimilarity,
@@ -317,7 +317,7 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
-/// The shortening of a placed demonstration, and its direction in the image; `None` as for
+/// The shortening of a placed demonstration, and the direction of the shortening in the image; `None` as for
 /// [`ShapeTemplate::foreshortening`](sdg_shape::ShapeTemplate::foreshortening).
 pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
@@ -326,8 +326,8 @@ pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemons
     sized.prepared.search.template().foreshortening(&view.field, &pose)
 }
 
-/// The agreement of edges and surface of a placed demonstration in a rectified window, refined there; `None` if a point
-/// of the outline has no position in the window.
+/// The agreement of edges and surface of a placed demonstration whose pose is refined in a rectified window; `None` if
+/// a point of the outline has no position in the window.
 pub(crate) fn agreement_in(
     searched: &SearchedImage<'_>,
     placed: &PlacedDemonstration<'_>,

@@ -18,9 +18,9 @@ pub type Origin = BTreeMap<String, String>;
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads this project's base weights for the network of `options`, without the parameters with a prefix in
-/// `reinitialized`, and the [`Origin`] of the weights; `None` if the file is of another kind, or the taught model has
-/// no network.
+/// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters whose names begin
+/// with an entry of `reinitialized` are left out. `None` if the file is of another kind, or the taught model has no
+/// network.
 ///
 /// # Errors
 /// The file cannot be read, the weights are of another preset, or no parameter has a given prefix.
@@ -63,8 +63,8 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
-/// Reads the weights in `path` for `network`, without the parameters with a prefix in `reinitialized`. If the file
-/// contains only a backbone, the rest of the network is initialised randomly and need not be named.
+/// Reads the weights in `path` for `network`. Parameters whose names begin with an entry of `reinitialized` are left
+/// out. If the file contains only a backbone, the rest of the network is initialised randomly and need not be named.
 ///
 /// `tell` receives the report of the conversion before the values are read.
 ///

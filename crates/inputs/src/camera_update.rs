@@ -36,7 +36,7 @@ impl CameraUpdate {
         Ok(())
     }
 
-    /// Reads the existing file.
+    /// Reads the existing file, if there is one.
     ///
     /// # Errors
     /// The file cannot be read or is not text, or is an input of this process.

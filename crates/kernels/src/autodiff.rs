@@ -261,10 +261,10 @@ macro_rules! consumed {
 /// The earlier gradient of a map if it came from this crate: it is removed, to be stored again with another gradient
 /// added.
 ///
-/// burn itself adds a second gradient to the first, but reads both in the order of their shape, which is the slowest
-/// for channels-last maps: a tenth of a training step of the `edge` preset. This is a macro because a node's type has
-/// no name outside burn. The gradient of a leaf is read after the pass and cannot be taken out: a leaf has another
-/// `requirement` than the node of an operation.
+/// burn itself adds a second gradient to the first, but reads both in the order of their shape. This order is the
+/// slowest for channels-last maps and takes a tenth of a training step of the `edge` preset. This is a macro because a
+/// node's type has no name outside burn. The gradient of a leaf is read after the pass and cannot be taken out. A leaf
+/// is recognised by its `requirement`, which differs from that of an operation's node.
 macro_rules! given_before {
     ($grads:ident, $ops_node:expr, $parent:expr) => {{
         let first = GIVEN.with_borrow_mut(|given| given.insert($parent.id.value));

@@ -180,7 +180,7 @@ widest! {
 
 widest! {
     // Converts the gradient with respect to a map's cells of length 1 to that with respect to the map: with u the cell
-    // and l its length, (g − u (u · g)) / l.
+    // of length 1 and l its original length, (g − u (u · g)) / l.
     fn through_lengths(grad: &mut [f32], unit: &[f32], lengths: &[f32]) -> () {
         let pixels = lengths.len();
         let mut dots = vec![0.0f32; pixels];

@@ -3,8 +3,8 @@
 /// Makes the C library keep freed memory, for the whole process. Call it once, at the start of `main`.
 ///
 /// A network's maps are megabytes each. GNU's allocator takes such blocks from the system and returns them, so the
-/// pages of every operation's result must be mapped again: a sixth of a backbone's time on one core. In one heap they
-/// are reused. On other systems this function does nothing.
+/// pages of every operation's result must be mapped again: a sixth of a backbone's time on one core. With these
+/// settings the pages are reused. On other systems this function does nothing.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     for (parameter, value) in [

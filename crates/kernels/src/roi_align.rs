@@ -30,7 +30,8 @@ mod tests;
 ///
 /// # Panics
 /// For other shapes; if the output size or a fixed sampling ratio is 0, the spatial scale is not positive and finite,
-/// or `features` is empty while R > 0; and, except on wgpu and CUDA, if an image index is not an integer in `0..N`.
+/// or `features` is empty while R > 0; and, except on wgpu and CUDA without autodiff, if an image index is not an
+/// integer in `0..N`.
 pub fn roi_align(features: Tensor<4>, rois: Tensor<2>, params: RoiAlignParams) -> Tensor<4> {
     let [num_images, channels, height, width] = features.dims();
     let [num_rois, columns] = rois.dims();

@@ -49,7 +49,7 @@ impl Capsule {
 /// first.
 ///
 /// # Source
-/// C. Ericson, *Real-Time Collision Detection*, 5.1.9; without branches, so that it can be computed in lanes.
+/// C. Ericson, *Real-Time Collision Detection*, 5.1.9; without branches, so that it can be computed in SIMD lanes.
 #[inline(always)]
 pub(crate) fn nearest_shares(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> (f64, f64) {
     /// A segment with a smaller squared length is a point, m².

@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn a_hand_lying_on_its_side_touches_with_its_body() {
-        // With joint 6 at 0, the hand points back horizontally at a height of 0.697 - 0.088, as computed by forward
+        // With joint 6 at 0, the hand points back horizontally at a height of 0.697 m - 0.088 m, as computed by forward
         // kinematics. With joint 7 at 90° from the ready pose, the hand's width of 0.204 m is vertical.
         let mut q = ready_pose();
         q[5] = 0.0;
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn a_motion_through_the_table_is_seen_in_the_middle() {
         // Joint 6 moves the hand from back to front about the wrist centre at 0.6973 m. The lowest point is an edge of
-        // the fingertips, at 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when the edge is
+        // the fingertips, 0.088 m + 0.011 m across and 0.107 m + 0.1034 m along from the wrist centre, when the edge is
         // vertically below the wrist centre.
         let panda = ArmGeometry::panda();
         let (mut start, mut end) = (ready_pose(), ready_pose());

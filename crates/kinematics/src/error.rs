@@ -23,8 +23,8 @@ pub enum KinematicsError {
         .violation.joint, .violation.min_rad.to_degrees(), .violation.max_rad.to_degrees(), .violation.found_rad.to_degrees()
     )]
     JointOutOfRange { what: &'static str, violation: LimitViolation },
-    /// No configuration reaches the pose, even without joint limits; for an arm without a closed form, none within
-    /// them.
+    /// No configuration reaches the pose, even without joint limits; for an arm without a closed form: no configuration
+    /// that was found within the joint limits reaches it.
     #[error(
         "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the nearest reachable tcp pose is {:.4} m and {:.2}° \
          away{}",

@@ -34,7 +34,7 @@ pub struct DhJoint {
 /// The data of an arm with its hand for kinematics, collisions and dynamics. Another arm is another value of this type,
 /// see [`ArmGeometry::panda`] and [`ArmGeometry::fr3`].
 ///
-/// An arm with fewer joints has the range from 0 to 0 for its last joints, whose columns of the Jacobian are zero.
+/// In an arm with fewer joints, the last joints have the range from 0 to 0; their columns of the Jacobian are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmGeometry {
     /// The joints, from joint 1 at the base.
@@ -107,7 +107,8 @@ pub struct FingerGeometry {
     pub half_width_m: f64,
     /// Thickness of the tip along the finger's motion, m.
     pub thickness_m: f64,
-    /// Half of the thickness along the finger's motion at the root: the distance of its centre from the pad's face, m.
+    /// Half of the finger's thickness at its root, along its motion: the distance of the root's centre from the face of
+    /// the pad, m.
     pub middle_m: f64,
     /// Capsules along z that contain the finger, from root to tip.
     pub capsules: Vec<FingerCapsule>,
@@ -268,7 +269,7 @@ mod tests {
     #[test]
     fn at_zero_the_arm_stands_upright_with_the_hand_down() {
         let frames = ArmGeometry::panda().frames(&JointVector::zeros());
-        // Straight up 0.333 + 0.316 + 0.384, forward 0.088 (the elbow's offsets cancel), down 0.107.
+        // In m: straight up 0.333 + 0.316 + 0.384, forward 0.088 (the elbow's offsets cancel), down 0.107.
         let flange = frames.base_from_flange.translation.vector;
         assert!((flange - Vector3::new(0.088, 0.0, 0.926)).norm() < 1e-12);
         let z = frames.base_from_flange.rotation * Vector3::z();
@@ -284,9 +285,9 @@ mod tests {
     #[test]
     fn the_ready_pose_is_where_franka_has_it() {
         let base_from_tcp = ArmGeometry::panda().forward(&ready_pose());
-        // In the plane y = 0, from the base: the shoulder is at a height of 0.333; the upper arm leans back by 45°, so
-        // it is along (-s, s) and its offset along (s, s); the forearm is level, with its offset of 0.0825 upwards;
-        // then 0.088 forward; flange and tcp are straight down.
+        // From the base, in the plane y = 0, in m. The shoulder is at a height of 0.333. The upper arm leans back by
+        // 45°: it is along (-s, s), and its offset is along (s, s). The forearm is level, with its offset of 0.0825
+        // upwards. Joint 7 is 0.088 forward of the forearm's end; flange and tcp are straight below joint 7.
         let s = std::f64::consts::FRAC_1_SQRT_2;
         let x = -0.316 * s + 0.0825 * s + 0.384 + 0.088;
         let z = 0.333 + 0.316 * s + 0.0825 * s + 0.0825 - 0.107 - 0.1034;

@@ -57,8 +57,8 @@ impl JointLimits {
         (self.position_min + self.position_max) * 0.5
     }
 
-    /// Whether `q` (rad), which was converted from degrees, violates the limits, but the unconverted numbers, taken as
-    /// radians, do not.
+    /// Whether radians were probably given as degrees: `q` (rad), converted from degrees, violates the limits, but the
+    /// numbers before the conversion, taken as radians, do not.
     pub fn are_radians_given_as_degrees(&self, q: &JointVector) -> bool {
         self.worst_violation(q, 0.0).is_some() && self.worst_violation(&q.map(f64::to_degrees), 0.0).is_none()
     }

@@ -2,12 +2,12 @@
 //!
 //! The tcp's position moves along a line and its orientation rotates about one fixed axis (slerp), both linear in the
 //! path parameter `s`. The joints follow the differential equation `dq/ds = J⁺ dx/ds - gain · (I - J⁺J) ∇H(q)`, whose
-//! solutions are smooth, unlike inverse kinematics at each waypoint. The second term moves the elbow away from joint
-//! limits without moving the tcp (H: sum of fourth powers of the joints' positions in their ranges). Each step is
-//! corrected by Newton iterations on the pose itself, which prevents drift.
+//! solutions are smooth. Inverse kinematics at each waypoint would not give a smooth path. The second term moves the
+//! elbow away from joint limits without moving the tcp (H: sum of fourth powers of the joints' positions in their
+//! ranges). Each step is corrected by Newton iterations on the pose itself, which prevents drift.
 //!
-//! `s` is a length: metres of the line, or radians of the rotation times [`LineOptions::metres_per_rad`] if that is
-//! more.
+//! `s` is a length, m. The total length is the larger of two values: the length of the line, and the rotation in rad
+//! times [`LineOptions::metres_per_rad`].
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -26,7 +26,7 @@ pub struct LineOptions {
     pub metres_per_rad: f64,
     /// Strength of the elbow's motion away from joint limits, rad² per m; 0 disables it.
     pub limit_avoidance: f64,
-    /// Maximum angle of the joints per metre of `s`, rad/m; a larger one means that a singularity is near.
+    /// Maximum angle of a joint per metre of `s`, rad/m; a larger value means that a singularity is near.
     pub max_rate_rad_m: f64,
 }
 
@@ -213,7 +213,7 @@ impl ArmGeometry {
     }
 }
 
-/// Positions this far beyond a limit are rounding errors.
+/// Positions up to this far beyond a limit are rounding errors, rad.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 /// A line shorter than this is no motion.
 const MIN_LENGTH_M: f64 = 1e-9;
@@ -294,7 +294,7 @@ impl Follower<'_> {
     }
 }
 
-/// Second derivatives by differences of the first derivatives, of fourth order inside and at the ends.
+/// Second derivatives from differences of the first derivatives; the formulas are of fourth order, also at the ends.
 fn fill_second_derivatives(knots: &mut [Knot], step_m: f64) {
     let last = knots.len() - 1;
     let scale = 1.0 / (12.0 * step_m);

@@ -174,7 +174,7 @@ mod tests {
         let path = RoundedPath::new(&[zero, middle, end], &[0.5]);
         assert!((path.length_secs() - 2.0).abs() < 1e-12);
         // At the middle of the corner, x = 1/2 and 0.5 s after its start, joint 2 has moved as in 0.5 s · (1/4) · (3/4)
-        // = 0.09375 s at full speed; joint 1 lacks as much.
+        // = 0.09375 s at full speed; joint 1 is short of the waypoint by the same time.
         let half = path.at(1.0);
         assert!((half.q[0] - 2.175 * (1.0 - 0.09375)).abs() < 1e-12, "{}", half.q);
         assert!((half.q[1] - 2.175 * 0.09375).abs() < 1e-12, "{}", half.q);

@@ -104,7 +104,8 @@ impl Trajectory {
     /// which would brake and accelerate along the path.
     ///
     /// # Errors
-    /// [`KinematicsError::Trajectory`] if the generator fails.
+    /// [`KinematicsError::Trajectory`] if the generator fails; for a path without motion, the errors of
+    /// [`Self::point_to_point`].
     pub fn along_path(
         path: JointPath,
         limits: &JointLimits,
@@ -291,8 +292,8 @@ impl Profile {
     }
 }
 
-/// Limits of velocity, acceleration and jerk along a path: those of the joints and, as two more "joints" that are
-/// linear in `s`, those of the tcp's position and orientation.
+/// Limits of velocity, acceleration and jerk along a path: those of the joints, and those of the tcp's position and
+/// orientation, which are treated as two more joints that are linear in `s`.
 struct Bounds<'a> {
     limits: &'a JointLimits,
     /// Limits of `s` itself, from the Cartesian limits.

@@ -236,8 +236,8 @@ pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
         weights[second * 2 * s + output] += at - first as f32;
     }
     let stretch = Tensor::<1>::from_floats(weights.as_slice(), &x.device()).reshape([s, 2 * s]);
-    // Both axes by a matrix product over the last axis: [N·C·S, S] x [S, 2S], then the rows in the same
-    // way.
+    // Each axis is doubled by a matrix product over the last axis: first the columns, [N·C·S, S] x [S, 2S], then the
+    // rows in the same way.
     let wide: Tensor<3> = x.reshape([n * c * s, s]).matmul(stretch.clone()).reshape([n * c, s, 2 * s]);
     wide.swap_dims(1, 2)
         .reshape([n * c * 2 * s, s])

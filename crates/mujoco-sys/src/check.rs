@@ -37,8 +37,8 @@ fn check(functions: &Functions) -> Result<(), LibraryError> {
     Ok(())
 }
 
-/// Measures the size of a struct: `initialise` writes to two buffers with different contents, both larger than `T`; the
-/// last byte in which they then agree is the end of the struct.
+/// Measures the size of a struct: `initialise` writes to two buffers with different contents, both larger than `T`. The
+/// last byte in which the buffers then agree is the end of the struct.
 ///
 /// The tolerance is one alignment, because trailing padding may remain unwritten.
 fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryError> {

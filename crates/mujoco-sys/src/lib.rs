@@ -6,9 +6,9 @@
 //! ```
 //!
 //! The bindings were generated from the Debian headers and are committed, so that a build needs no libclang. Feature
-//! `buildtime_bindgen` generates them again from the installed headers, for another version of MuJoCo. Since a library
-//! of another version would read the structs of these bindings at wrong offsets, [`load`] compares the version and the
-//! sizes of the structs that it can check; the tests compare the sizes and many offsets of the structs that
+//! `buildtime_bindgen` generates them again from the installed headers, for another version of MuJoCo. A library of
+//! another version would read the structs of these bindings at wrong offsets. [`load`] therefore compares the version
+//! and the sizes of the structs that it can check. The tests compare the sizes and many offsets of the structs that
 //! `sdg-simulation` uses with the values of a C compiler.
 //!
 //! A build needs no libmujoco, and a program starts without it. The functions that `sdg-simulation` calls are in

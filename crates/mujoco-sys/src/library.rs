@@ -1,6 +1,6 @@
-//! MuJoCo's functions, in a library that is loaded at first use.
+//! MuJoCo's functions, in a library that [`crate::load`] loads at run time.
 //!
-//! A program linked to libmujoco does not start without the library, although most of the program's commands need no
+//! A program linked to libmujoco would not start without the library, although most of the program's commands need no
 //! simulator.
 
 use std::ffi::{c_char, c_int, c_uchar};

@@ -1,11 +1,11 @@
-//! Angles as classes on a circle, and the conversion back to angles with a fraction of a class.
+//! Angles as classes on a circle, and the conversion of class probabilities back to angles, to a fraction of a class.
 //!
-//! K classes, class k centred on k · 360° / K (divided by the symmetry, see below). A *position* is a point on the
-//! circle of classes in [0, K), with fractions.
+//! There are K classes; class k is centred on k · 360° / K (divided by the symmetry, see below). A *position* is a
+//! point on the circle of classes in [0, K), with fractions.
 //!
-//! A part that looks the same after a rotation by 360° / n has n equivalent angles, and a network trained on one of
-//! them would learn their mean. So the angle is **folded**: n·θ replaces θ, the circle of classes is one n-th of a
-//! full rotation of the part, and the loss does not depend on rotations that no picture shows.
+//! A part that looks the same after a rotation by 360° / n has n equivalent angles, and a network trained on the
+//! recorded one would learn their mean. So the angle is **folded**: n·θ replaces θ, the circle of classes is one n-th
+//! of a full rotation of the part, and the loss does not depend on rotations that no picture shows.
 
 use std::f64::consts::TAU;
 
@@ -24,8 +24,8 @@ pub struct AngleClasses {
 /// The target distribution for a true angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Labels {
-    /// The whole probability in the nearest class, as in the paper: an error of one degree costs as much as one of
-    /// 180.
+    /// The whole probability in the nearest class, as in the paper: an error of one degree costs as much as one of 180
+    /// degrees.
     Hard,
     /// A bell around the exact angle, cyclic like the classes.
     VonMises {

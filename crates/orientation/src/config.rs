@@ -60,7 +60,8 @@ impl OrientationConfig {
     /// million parameters); the class with the highest score is the angle.
     ///
     /// # Source
-    /// Paper, sections IV-A and V. It does not describe the layers between input and output; they are our choice.
+    /// Paper, sections IV-A and V. The paper does not describe the layers between input and output; they are our
+    /// choice.
     pub fn paper() -> Self {
         Self {
             input_px: 224,

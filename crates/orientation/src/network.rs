@@ -69,7 +69,7 @@ impl OrientationConfig {
         }
         let flat = in_channels * self.last_map_px().pow(2);
         let hidden = Linear::init(flat, self.hidden, Distribution::he_normal(flat), &mut init);
-        // Small first logits: all angles are equally likely.
+        // Small initial weights, so that all angles are about equally likely at first.
         let classes =
             Linear::init(self.hidden, self.classes.num_classes, Distribution::Normal { std: 0.01 }, &mut init);
         Ok(OrientationCnn { stages, hidden, classes, config: self.clone() })
@@ -114,7 +114,7 @@ impl OrientationCnn {
     ///
     /// # Units and frames
     /// The direction of the marked grasp line in the crop, `atan2(dy, dx)` with y down; within the part's symmetry.
-    /// Crops of detected boxes are not rotated, so it is also the direction in the image.
+    /// Crops of detected boxes are not rotated, so the angle is also the direction in the image.
     ///
     /// # Errors
     /// [`OrientationError::CropSize`] for a crop whose size is not [`OrientationConfig::input_px`].

@@ -15,7 +15,7 @@ use crate::teacher::PageTeacher;
 const PROJECT_FILE: &str = "sdg-project.json";
 
 /// Opens the files of a session, and then its camera with `open_camera`. `photo_path` is the photo to be taken.
-/// `report` is given a line for each picture to try that cannot be read.
+/// `report` is given a line for each picture of an unsupported format in the folders of pictures to try.
 ///
 /// Everything is checked here, so that an error does not come after minutes of marking.
 ///
@@ -46,7 +46,7 @@ pub fn open_session(
     let locks = lock_all(marks.chain(photo).chain(project_file))?;
     for folder in options.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in sdg_files::entries(folder)? {
-            // Other files beside the pictures are expected and not reported, but unreadable pictures are.
+            // Other kinds of files are expected beside the pictures and are not reported.
             if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
                 let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
                 report(&format!("left out: {why}"));

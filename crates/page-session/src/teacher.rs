@@ -157,7 +157,7 @@ impl PageTeacher {
     }
 }
 
-/// `seconds` includes all waiting: for the teaching and for the test of the model on held-out samples.
+/// `seconds` is the duration of teaching and, with `figures`, of the test on held-out samples.
 fn summary(model: &GraspModel, figures: Option<Figures>, seconds: f64) -> TaughtSummary {
     let negatives =
         model.facts().negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });

@@ -2,7 +2,7 @@
 //!
 //! Usage: `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED [ZOOM]]`
 //!
-//! Writes `parts_N.png` (100 parts, a photo of each with marks and outline), `scenes_N.png` (100 scenes of as many
+//! Writes `parts_N.png` (100 parts, a photo of each with marks and outline), `scenes_N.png` (a scene of each of these
 //! parts) and `look_alikes.png` (each row shows a part, its mirror image, two copies with a moved feature, and two
 //! copies of other sizes) into FOLDER.
 

@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut symmetries = String::new();
     for number in 0..count {
         let part = Part::generate(FIRST_SEED + number.min(count - 2));
-        // A different photo even for the same part.
+        // The seed `number` gives a different photo even for the same part.
         let made = demonstration(&part, &PHOTO, number);
         let name = format!("part-{number:03}");
         made.image.save(folder.join(format!("{name}.png")))?;

@@ -2,9 +2,9 @@
 //!
 //! Usage: `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
 //!
-//! Prints the time to make ten parts, then a line for the default scenes and one for each single condition, at 320x240;
-//! with a name (`default`, `tilt`, …) only the line of that name. Processor time is that of the process, so it is also
-//! meaningful on a busy machine.
+//! Prints the time to make ten parts, then a line for the default scenes and one for each single condition, at 320x240
+//! pixels. With a name (`default`, `tilt`, …), prints only the line of that name after the time. Processor time is that
+//! of the process, so it is also meaningful on a busy machine.
 
 use std::time::Instant;
 

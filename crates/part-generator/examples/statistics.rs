@@ -4,10 +4,11 @@
 //!
 //! A row describes the generator's default scenes of 60 parts, or all pictures of a folder (PNG, JPEG; LabelMe marks in
 //! a `.json` beside a picture are read for the part's size and contrast). Pictures are first reduced to a width of 320
-//! pixels. Columns are means over pictures: brightness, its standard deviation within a picture, saturation, the 50th,
-//! 90th and 99th percentile of the gradient's magnitude (grey levels per pixel), the fraction of pixels with a gradient
-//! above 40, noise (Immerkær's estimate), the part's diagonal divided by the picture's, and the colour distance between
-//! the part's box and the frame around it.
+//! pixels. The columns after the number of pictures are means over pictures: brightness, its standard deviation within
+//! a picture, saturation, the 50th, 90th and 99th percentile of the gradient's magnitude (grey levels per pixel), the
+//! fraction of pixels with a gradient above 40, and noise (Immerkær's estimate). The last two columns are means over
+//! parts: the part's diagonal divided by the picture's, and the colour distance between the part's box and the frame
+//! around it.
 
 use std::path::Path;
 
@@ -24,7 +25,7 @@ const WIDTH: u32 = 320;
 /// Minimum gradient of strong edges, in grey levels per pixel.
 const STRONG_EDGE: f32 = 40.0;
 
-/// Measurements of a picture: all columns except the last two, followed by those that need boxes.
+/// Measurements of a picture: the values of all columns except the last two, and these two values for each box.
 struct Measured {
     values: [f64; 8],
     parts: Vec<[f64; 2]>,
@@ -113,7 +114,7 @@ fn measure(image: &RgbImage, boxes: &[BoundingBox]) -> Measured {
     Measured { values, parts }
 }
 
-/// Distance between the mean colours of a box and of a frame around it, whose width is a fifth of the box's size.
+/// Distance between the mean colours of a box and of a frame around it. The frame's width is a fifth of the box's size.
 fn contrast(image: &RgbImage, bbox: &BoundingBox) -> f64 {
     let mut sums = [[0.0f64; 4]; 2];
     let (mx, my) = (0.2 * bbox.width(), 0.2 * bbox.height());

@@ -58,7 +58,7 @@ impl Part {
             let shift = diagonal * rng.uniform(MOVE_SHARES[0], MOVE_SHARES[1]);
             let recipe = moved(&self.recipe, shift, rng.angle(), rng.random_group(&self.recipe))?;
             let made = Part::from_recipe(self.kind, recipe)?;
-            // In the same position a visible fraction must differ, and at no angle may the two look the same.
+            // In the same position, a visible fraction must differ. At every angle, the two parts must look different.
             let in_place = PartPair::new(&self.relief, self.center, &made.relief, self.center);
             let turned = PartPair::new(&self.relief, self.center, &made.relief, made.center);
             let differs = in_place.difference(0.0, MIN_CHANGED_SHARE) > MIN_CHANGED_SHARE;
@@ -93,7 +93,7 @@ trait DrawGroup {
 impl<R: Draw> DrawGroup for R {
     fn random_group(&mut self, recipe: &Recipe) -> u16 {
         let last = recipe.features.iter().map(|feature| feature.group).max().unwrap_or(0);
-        // 0 is the body, of which one corner or bend is moved.
+        // Group 0 is the body; it is selected only if there is no other group.
         self.whole(usize::from(last > 0), last as usize) as u16
     }
 }

@@ -15,7 +15,8 @@ const MAX_FOLD: u32 = 40;
 const HEIGHT_TOLERANCE_MM: f32 = 0.3;
 const HEIGHT_TOLERANCE_SHARE: f32 = 0.03;
 
-/// Minimum visible difference of colours (sum over channels of square roots of linear values).
+/// Minimum visible difference of colours: the sum over channels of the differences between square roots of linear
+/// values.
 const COLOR_TOLERANCE: f32 = 0.12;
 
 /// The centroid of a part's area, in its own frame.

@@ -22,7 +22,7 @@ pub(crate) struct Tile {
 /// must be below four million. The function has no call and no comparison, so compilers vectorise it.
 #[inline(always)]
 pub(crate) fn floor(value: f32) -> i32 {
-    // 1.5 * 2^23: the low bits of a sum with it are the integer.
+    // 1.5 * 2^23: the low bits of its sum with a number are the rounded number.
     const WHOLE: f32 = 12_582_912.0;
     (value - 0.5 + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32
 }

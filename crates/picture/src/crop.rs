@@ -4,9 +4,9 @@
 //! bar at 30° in a wide box would appear at another angle, with an error that depends on the angle itself.
 //!
 //! **Its side is the box's diagonal**, with a margin. A part that is rotated in place changes its box; the longer side
-//! of a bar's box is the bar's length times cos θ, so a crop by the longer side would show the bar 1.4 times as large
-//! at 45° as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside for
-//! any error of the box within the margin.
+//! of a bar's box is the bar's length times cos θ (up to θ = 45°), so a crop by the longer side would show the bar 1.4
+//! times as large at 45° as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part
+//! is inside for any error of the box within the margin.
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
@@ -89,7 +89,7 @@ impl CropWindow {
     }
 }
 
-/// `f32::floor` without the call into the C library that targets without such an instruction need.
+/// `f32::floor` without a call into the C library, which targets without a rounding instruction would need.
 fn floor(value: f32) -> f32 {
     // Up to this value, the conversion to i32 and back is exact.
     if value.abs() > 8e6 {

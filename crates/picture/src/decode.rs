@@ -74,13 +74,14 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 /// The format is recognised by the content: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF.
 /// Grey and deeper images are converted; 10 and 12 bits stored in 16 are scaled by their own range. Transparent pixels
 /// are composited over white, unless all pixels are (almost) fully transparent, which is how programs leave an unused
-/// alpha channel. Floats above 2 are read as integers of 8 to 16 bits. Of a TIFF, the full-size page is read.
+/// alpha channel. If a float is above 2, all are read as integers of 8 to 16 bits. Of a TIFF, the full-size page is
+/// read.
 ///
 /// # Errors
 /// Another format (for a HEIC photo, the error names the phone's setting that avoids HEIC), a truncated or damaged
-/// file, zero width or height, more than `limits.max_pixels` (PPM: also more than 64 megapixels, a side above 16384
-/// pixels or values above 255), a TIFF with several full-size pages, with raw data or with a palette that does not have
-/// 8 bits, or a CMYK JPEG for which it is unknown whether the inks are inverted.
+/// file, zero width or height, more than `limits.max_pixels` (PPM: also more than 67 megapixels, a side above 16384
+/// pixels or a maximum value other than 255), a TIFF with several full-size pages, with raw data or with a palette that
+/// does not have 8 bits, or a CMYK JPEG for which it is unknown whether the inks are inverted.
 pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
     if bytes.starts_with(b"P6") {
         return ppm::decode_ppm(bytes, |width, height| check_size(width, height, limits));
@@ -251,7 +252,7 @@ mod tests {
         let deep: ImageBuffer<Rgba<f32>, _> = ImageBuffer::from_pixel(512, 512, Rgba([0.5; 4]));
         let bytes = encode(&deep.into(), ImageFormat::Tiff);
         assert_eq!(decode(&bytes).unwrap().dimensions(), (512, 512));
-        // 16 bytes per pixel, where 8 and one MiB in all are allowed.
+        // The picture needs 16 bytes per pixel; 8 bytes per pixel and 1 MiB in addition are allowed.
         let error = decode_image(&bytes, &ImageLimits { max_pixels: 512 * 512 }).unwrap_err().to_string();
         assert!(error.contains("Memory limit"), "{error}");
     }

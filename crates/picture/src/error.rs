@@ -24,7 +24,7 @@ pub enum PictureError {
     /// Width or height is zero.
     #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]
     EmptyImage { width: u32, height: u32 },
-    /// More pixels than the limit; detected in the header, before any allocation.
+    /// More pixels than the limit; detected in the header, before memory for the pixels is allocated.
     #[error(
         "enormous image: expected at most {} megapixels, found {width}×{height} = {} megapixels; save it with half the width and height",
         max_pixels / 1_000_000,

@@ -56,7 +56,7 @@ impl JpegScanner {
         }
         loop {
             if self.is_in_scan {
-                // In entropy-coded data, 0xff is always followed by 0x00 or a restart marker.
+                // In entropy-coded data, 0xff is always followed by 0x00 or by the second byte of a restart marker.
                 let rest = &bytes[self.position..];
                 match rest.windows(2).position(|pair| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7)) {
                     Some(marker) => self.position += marker,

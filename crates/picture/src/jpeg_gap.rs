@@ -14,8 +14,9 @@ const MIN_ZEROS: usize = 32;
 const ADDED_BYTES: usize = 64;
 /// Number of bytes replaced at the end of the data, for the same purpose.
 const EXCHANGED_BYTES: usize = 8;
-/// Maximum number of stretches whose end is tested, and of pixels decoded for this, at least those of one stretch: the
-/// picture is decoded up to four times for each. The order of restart markers is tested for all of them.
+/// Maximum number of stretches whose end is tested, and of pixels decoded for these tests. The picture is decoded up to
+/// four times for each stretch; one stretch is tested in any case. The order of restart markers is tested at each
+/// stretch with a run of zeros.
 const MAX_TESTED: u64 = 8;
 const MAX_TESTED_PIXELS: u64 = 400_000_000;
 /// Two fill values, because the original bytes may happen to give the same result as one of them.
@@ -66,8 +67,8 @@ fn decoded(jpeg: &[u8]) -> Option<DynamicImage> {
 /// Tests the ends of stretches.
 struct Ends<'a> {
     jpeg: &'a [u8],
-    /// `None` if the picture cannot be decoded, or has one colour. Such a picture may consist only of zero codes, and
-    /// missing blocks are filled with the same colour.
+    /// `None` if the picture cannot be decoded, or has one colour. A picture of one colour may consist only of zero
+    /// codes, and the decoder fills missing blocks with the same colour.
     whole: Option<DynamicImage>,
     /// Number of stretches that may still be tested.
     left: u64,
@@ -157,8 +158,8 @@ mod tests {
 
     #[test]
     fn zeros_that_are_codes_are_read() {
-        // A block has a difference of 0 and an end of block, one bit each; of 320 blocks the second and the last have
-        // a difference of 1, which needs four bits. Together they are 80.5 bytes.
+        // Most of the 320 blocks have two bits: one for a difference of 0, one for the end of block. The second and the
+        // last block have a difference of 1 and therefore four bits. All blocks together are 80.5 bytes.
         let table = |class: u8| [&[0xff, 0xc4, 0, 21, class, 1, 1][..], &[0; 14], &[0, 1]].concat();
         let quantization = [&[0xff, 0xdb, 0, 67, 0][..], &[8; 64]].concat();
         let frame = [0xff, 0xc0, 0, 11, 8, 0, 64, 1, 64, 1, 1, 0x11, 0];

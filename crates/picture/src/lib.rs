@@ -6,7 +6,7 @@
 //!                          ├─ PNG, WebP, BMP ───────────────────┘                                              ├─ RGB
 //!                          └─ PPM ─────────────────────────────────────────────────────────────────────────────┘
 //! ```
-//! The size is checked before memory is allocated.
+//! The size is checked before memory for the pixels is allocated.
 //!
 //! [`CropWindow`] resamples a square of a picture, possibly rotated, for a network; [`Pyramid`] is for many such squares of
 //! one picture.

@@ -4,7 +4,7 @@ use image::RgbImage;
 
 use crate::error::PictureError;
 
-/// Maximum number of pixels: 64 megapixels, 192 MiB.
+/// Maximum number of pixels: 67 megapixels, 192 MiB.
 const MAX_PIXELS: u64 = 1 << 26;
 /// Maximum width and height.
 const MAX_SIDE: u32 = 1 << 14;
@@ -58,7 +58,7 @@ impl PpmHead {
         }
         let [width, height, maximum] = numbers;
         if maximum != 255 {
-            return Err(format!("a PPM with values up to {maximum}; only values up to 255 are supported"));
+            return Err(format!("a PPM with the maximum value {maximum}; only 255 is supported"));
         }
         let is_bounded = width <= MAX_SIDE && height <= MAX_SIDE && u64::from(width) * u64::from(height) <= MAX_PIXELS;
         if width == 0 || height == 0 || !is_bounded {

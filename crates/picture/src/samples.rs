@@ -50,8 +50,8 @@ fn stretch<P: Pixel<Subpixel = u16>>(picture: &mut ImageBuffer<P, Vec<u16>>, num
     }
 }
 
-/// Divides floats that are integers of 8, 10, 12 or 16 bits by the maximum of that depth. Alpha is treated like the
-/// colours.
+/// Divides floats that are integers of 8, 10, 12 or 16 bits by the maximum of that depth, and larger ones by the
+/// largest of them. Alpha is treated like the colours.
 fn to_shares<P: Pixel<Subpixel = f32>>(picture: &mut ImageBuffer<P, Vec<f32>>) {
     let largest = picture.iter().copied().filter(|sample| sample.is_finite()).fold(0.0, f32::max);
     if largest <= MAX_OVEREXPOSED {

@@ -64,8 +64,8 @@ pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// There are several full-size pages; the file is a raw photo; a palette does not have 8 bits; or the values of a tag
-/// of the first page need more bytes than the file has, for which the decoder would allocate memory before reading.
-/// Structures that cannot be parsed are left to the decoder.
+/// of the first page, except a private tag, need more bytes than the file has. The decoder would allocate memory for
+/// such values before reading them. Structures that cannot be parsed are left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
@@ -177,7 +177,7 @@ impl<'a> File<'a> {
             for sub in further {
                 pages.push(self.page(sub)?);
             }
-            // This also ends a circle.
+            // This check also ends a circular chain.
             if pages.len() > MAX_PAGES {
                 return None;
             }
@@ -451,7 +451,8 @@ mod tests {
         let most = MAX_PAGES as u32;
         assert_eq!(pages(most - 1), Some(MAX_PAGES));
         assert_eq!(pages(most + 1), None);
-        // Nor are they counted by reading them: here all are the directory itself, which is not read again.
+        // The number of offsets decides, not the number of pages: here all offsets lead to the first directory, which
+        // is not read again.
         let own = |count: u32| {
             let mut bytes = directory(&[entry(SUB_DIRECTORIES, count, 26)]);
             bytes.extend(8u32.to_le_bytes().repeat(count as usize));

@@ -27,7 +27,7 @@ pub struct AttemptSummary {
     pub detection_error: Option<DetectionError>,
     /// Index of the step at which the attempt ended, from 0; the last step on success.
     pub step: usize,
-    /// Whether the part was held at the end.
+    /// Whether the part was held at the end or, in an attempt with a place, was put down in it.
     pub success: bool,
     /// The reason of the failure; empty on success.
     pub why: String,

@@ -4,9 +4,10 @@
 //! τ = Jᵀ (-K e - ∫ k_i K e dt - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
 //!     └ spring, its integral and damper of the tcp   └ spring of the elbow, without moving the tcp
 //! ```
-//! J is the tcp's Jacobian in the base frame, e the deviation of the tcp from its desired pose (m, and about half of
-//! the rotation vector, rad), v_d the desired twist, D = 2 √(K m) for a mass m of the tcp. Gravity is not included: the
-//! robot adds it, also for the load that was given to it.
+//! J is the tcp's Jacobian in the base frame, v_d the desired twist, and D = 2 √(K m) for a mass m of the tcp. e is the
+//! deviation of the tcp from its desired pose: the translation in m, and about half of the rotation vector in rad. k_i
+//! is the growth rate of the integral; k_n is the elbow's stiffness about its configuration q_n. Gravity is not
+//! included: the robot adds it, also for a load that was set.
 //!
 //! A spring is not exact: at 150 N/m an unreported part of 0.7 kg pulls the tcp down by 46 mm, and joint friction of
 //! 1 N·m causes an error of about 20 mm. In free air the integral compensates both; during contact it would press with
@@ -76,7 +77,8 @@ impl Impedance {
     /// # Errors
     /// [`RobotError::Configuration`](crate::RobotError::Configuration).
     pub(crate) fn validate(&self, when: &str) -> Result<()> {
-        /// Along and about each direction, N/m and N·m/rad. A reference 15 mm ahead of the tcp then presses with 15 N.
+        /// Along and about each direction, N/m and N·m/rad. At 1000 N/m, a reference 15 mm ahead of the tcp presses
+        /// with 15 N.
         const MAX_STIFFNESS: [f64; 2] = [1000.0, 100.0];
         /// Roughly the mass of an arm, kg; the same number limits the rotational values, kg·m².
         const MAX_MASS: f64 = 20.0;
@@ -195,7 +197,7 @@ mod tests {
         TcpReference { base_from_tcp, twist: Vector6::zeros() }
     }
 
-    /// The torques, once their rate is no longer limited, of an arm held at `q`.
+    /// The torques of an arm held at `q`, once their rate is no longer limited.
     fn settled(impedance: Impedance, q_null: JointVector, q: &JointVector, wanted: Isometry3<f64>) -> JointVector {
         let mut control = ImpedanceControl::new(impedance, q_null, JointVector::zeros());
         let zero = JointVector::zeros();

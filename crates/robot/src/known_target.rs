@@ -14,7 +14,7 @@ use crate::sequence::GraspConfig;
 /// Assumed accuracy of positions, in m, and of sizes, as a fraction.
 const EXACT: f64 = 1e-4;
 
-/// Finds the same target, or none, for any pose of the arm; after a part was put down, its intended pose.
+/// Finds the same target, or none, for any pose of the arm. After the part was put down, finds it at its intended pose.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownTarget {
     target: Option<GraspTarget>,

@@ -9,9 +9,9 @@ use crate::room::{MIN_FINGER_ROOM_M, gap_m};
 
 /// Distance by which the capsules of the finger tips extend beyond the finger tips along their motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
-/// Distance by which each side of a part is moved inwards on straight paths, m, so that fingers can move between parts:
-/// the excess of the capsules, plus the difference between the planner's margin (3 mm) and the room that fingers must
-/// have in a tray (1 mm).
+/// Distance by which each side of a part is moved inwards on straight paths, m, so that fingers can move between parts.
+/// It is [`CAPSULES_STAND_OUT_M`] plus the difference between the planner's margin (3 mm) and the room that fingers
+/// must have in a tray (1 mm).
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
 /// Minimum half width or radius of the solid that stands for a part, m.
 const MIN_HALF_M: f64 = 0.0005;

@@ -7,7 +7,7 @@ use crate::error::{Result, RobotError};
 /// Fractions of the arm's velocity, acceleration and jerk limits.
 type Shares = [f64; 3];
 
-/// Largest fraction of the joints' velocity limits: the one of rehearsals. Higher speeds were never tried.
+/// Largest allowed fraction of the joints' velocity limits: the fraction in rehearsals. Higher speeds were never tried.
 pub const MAX_SPEED: f64 = 0.6;
 /// Default speed of a real arm, as a fraction of the joints' velocity limits.
 pub const DEFAULT_SPEED: f64 = 0.1;

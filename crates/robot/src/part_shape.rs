@@ -28,8 +28,8 @@ impl PartShape {
     /// heights of top and grasp above the surface under the part; all in m.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] for a length outside (0, 1] m, for an outline without an area, and for one that
-    /// extends more than a metre from its grasp or is not finite.
+    /// [`RobotError::Configuration`] for a length outside (0, 1] m, for an outline without an area, and for an outline
+    /// with a point that is not finite or more than 1 m from the grasp.
     pub fn new(
         outline: impl IntoIterator<Item = Point2<f64>>,
         jaw_width_m: f64,

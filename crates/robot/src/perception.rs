@@ -35,8 +35,8 @@ pub trait PartFinder<A: Arm> {
         Ok(Vec::new())
     }
 
-    /// Measures z of the surface beside a part from two sightings of the last calls of [`PartFinder::sight`], near its
-    /// expected height; `None` if the pictures do not show the surface well enough.
+    /// Measures z of the surface beside a part from two sightings of the last calls of [`PartFinder::sight`], near the
+    /// surface's `expected` height; `None` if the pictures do not show the surface well enough.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
@@ -44,8 +44,8 @@ pub trait PartFinder<A: Arm> {
         Ok(None)
     }
 
-    /// The other detections above the threshold in the picture of the last call: parts of the same kind beside the one
-    /// that was found.
+    /// The other accepted detections in the picture of the last call: parts of the same kind beside the one that was
+    /// found.
     fn others(&self) -> Vec<GraspTarget> {
         Vec::new()
     }

@@ -11,8 +11,8 @@ pub struct Place {
     pub name: String,
     /// x and y of the pose, of the bin's centre or of the centre of the tray's first cell, base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of the part's marked line, and of the x axis of a tray or bin: about the vertical from the base's x,
-    /// rad.
+    /// Direction of the part's marked line, and of the x axis of a tray or bin: the angle about the vertical from the
+    /// base's x axis, rad.
     pub yaw_rad: f64,
     /// z of the surface under the parts, base frame, m.
     pub surface_m: f64,
@@ -46,7 +46,7 @@ pub struct PlaceGoal {
     pub name: String,
     /// x and y of the part's grasp in the base frame, m.
     pub at_m: [f64; 2],
-    /// Direction of the part's marked line about the vertical from the base's x, rad.
+    /// Direction of the part's marked line: the angle about the vertical from the base's x axis, rad.
     pub yaw_rad: f64,
     /// z of the surface under the part, base frame, m.
     pub surface_m: f64,

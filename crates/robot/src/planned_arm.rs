@@ -17,7 +17,7 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
-    /// A compliant descent: of a held part until the contact with its place, of an open hand to the grasp.
+    /// A compliant descent: of a held part until the contact with its place, or of an open hand to the grasp.
     Down {
         /// Joint positions at the end, rad.
         end: JointVector,

@@ -3,8 +3,8 @@
 //! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth
 //! step. The arm thus stays on the checked path, and its velocities do not exceed the motion's. The additional
 //! acceleration is the velocity times `d²s/dt²`. This factor is at most `1.5 / STOP_SECS`, which gives 3.3 rad/s² for
-//! joint 2 of a Panda at 60 % of its speed. This joint has the lowest limit, 7.5 rad/s², of which a free motion itself,
-//! including corners, uses at most 40 %.
+//! joint 2 of a Panda at 60 % of its speed. Joint 2 has the lowest limit, 7.5 rad/s²; a free motion, including its
+//! corners, uses at most 40 % of it.
 
 use sdg_kinematics::JointVector;
 
@@ -163,7 +163,7 @@ mod tests {
             largest[0], largest[1]
         );
         assert!(largest.iter().all(|share| *share <= 1.0), "{largest:?}");
-        // Braking adds to the accelerations of the corner, so that this exceeds the 0.4 of the motion alone.
+        // Braking adds to the accelerations of the corner, so that the fraction exceeds the 0.4 of the motion alone.
         assert!(largest[0] > 0.45, "{largest:?}");
     }
 

@@ -18,8 +18,8 @@ const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 const MAX_SLOWDOWNS: usize = 8;
 /// Factor of velocity, acceleration and jerk at each slowdown.
 const SLOWDOWN: f64 = 0.8;
-/// Fraction of the joints' acceleration limits for straight motions of the tcp: the measured acceleration exceeds the
-/// commanded one by up to 5 %.
+/// Fraction of the joints' acceleration limits that straight motions of the tcp use, because the measured acceleration
+/// exceeds the commanded one by up to 5 %.
 const LINE_ACCELERATION: f64 = 0.9;
 
 /// An arm, the limits of its motions, and whether it may move.
@@ -128,8 +128,8 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the
     /// slowest.
     ///
-    /// Necessary because a straight motion in joint space is planned without the tcp's limits, and because between the
-    /// samples of a timed path a joint may slightly exceed its limit.
+    /// This is necessary because a straight motion in joint space is planned without the tcp's limits, and because
+    /// between the samples of a timed path a joint may slightly exceed its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {

@@ -9,9 +9,9 @@
 //!        └──┬─┬─┘
 //!           └─┘
 //! ```
-//! All neighbouring cells count as filled. The order of filling would make no difference for a hand with a fixed
-//! orientation: its fingers open equally to both sides, and of two neighbours the second is always placed beside the
-//! first.
+//! All neighbouring cells count as filled. For a hand with a fixed orientation, the order in which the cells are filled
+//! makes no difference: the fingers open equally to both sides, and of two neighbouring parts the second is always
+//! placed beside the first.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +28,8 @@ use crate::place::PlaceGoal;
 const FINGER_ROOM_M: f64 = 0.002;
 /// Minimum distance between two parts, m: both may be off by [`FINGER_ROOM_M`].
 const PART_ROOM_M: f64 = 2.0 * FINGER_ROOM_M;
-/// Minimum room for fingers that compensate the sliding of a part, m: they are then off the centre of the cell.
+/// Minimum room for the fingers if they compensate the sliding of a part, m: such fingers are off the centre of the
+/// cell.
 pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
 /// Number of angles that are tried for a part with full rotational symmetry: every 15°, which includes both axes of a
 /// tray and its diagonals.
@@ -52,11 +53,13 @@ pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64, hand: &Hand
 }
 
 impl PlaceGoal {
-    /// Checks that parts in the neighbouring cells leave room for this part, and at some angle of its symmetry for
-    /// fingers of `hand` that open `release_margin_m` wider than the part (m).
+    /// Checks that the parts in the neighbouring cells leave room for this part and, at one or more angles of its
+    /// symmetry, for the fingers of `hand`. When they release the part, the fingers open `release_margin_m` (m) wider
+    /// than the part.
     ///
     /// # Errors
-    /// [`RobotError::Configuration`] without that room; the error contains the reason and a sufficient pitch.
+    /// [`RobotError::Configuration`] without that room; the error contains the reason and, if one was found, a
+    /// sufficient pitch.
     pub fn check_room(
         &self,
         part: &PartShape,
@@ -117,9 +120,9 @@ impl PlaceGoal {
         ))
     }
 
-    /// Tries three minimum distances between the fingers, at this opening (m), and the surrounding parts, the largest
-    /// first. Returns the poses of the hand that keep the largest of these distances that at least one pose keeps;
-    /// empty if no pose keeps any of them.
+    /// Selects the poses of the hand with room for the fingers at this opening (m). Three minimum distances between
+    /// fingers and surrounding parts are tried, the largest first. The first distance that any pose keeps decides: all
+    /// poses that keep it are returned. Empty if no pose keeps any of the distances.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -170,7 +173,7 @@ impl PlaceGoal {
     }
 }
 
-/// A length, rounded down to whole millimetres and increased by `steps` millimetres.
+/// A length, unchanged for 0 `steps`, otherwise rounded down to whole millimetres and increased by `steps` millimetres.
 fn longer_m(before_m: f64, steps: u32) -> f64 {
     const STEP_M: f64 = 1e-3;
     if steps == 0 { before_m } else { ((before_m / STEP_M + ROUNDING_M).floor() + f64::from(steps)) * STEP_M }
@@ -195,7 +198,8 @@ fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64
     })
 }
 
-/// Distance between two convex polygons, m; if they overlap, minus the shortest distance that separates them.
+/// Distance between two convex polygons, m; if they overlap, minus the length of the shortest displacement that
+/// separates them.
 pub(crate) fn gap_m(one: &Polygon, other: &Polygon) -> f64 {
     let edges = one.edges().chain(other.edges());
     let separation_m = edges.filter_map(|(from, to)| {

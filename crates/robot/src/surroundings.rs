@@ -102,7 +102,8 @@ impl Surroundings<'_> {
     }
 
     /// The collision model of straight paths: the hand may touch the table, and the held part may touch every obstacle,
-    /// because its shape is known less exactly than the fingers', and its room in a tray was checked before.
+    /// because the part's shape is known less exactly than that of the fingers, and because its room in a tray was
+    /// checked before.
     pub(crate) fn contact_model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
         let opening_m = self.opening_m.clamp(0.0, arm.hand.opening_max_m);
@@ -180,14 +181,19 @@ impl<A: Arm> Robot<'_, A> {
         for seed in 0..NUM_SEEDS {
             let mut options = PlanOptions::default();
             (options.seed, options.max_checks) = (seed, MAX_CHECKS);
-            let Plan { ways, approach, goal_idx, .. } = match to {
+            let planned = match to {
                 Destination::Configuration(q) => self.geometry().plan_to(&model, &start, &[**q], &options),
                 Destination::Poses(poses) => self.geometry().plan(&model, &start, poses, None, &options),
                 Destination::Approached(poses, length_m) => {
                     let straight = StraightApproach { length_m: *length_m, model: &on_approach };
                     self.geometry().plan(&model, &start, poses, Some(&straight), &options)
                 }
-            }?;
+            };
+            let Plan { ways, approach, goal_idx, .. } = match planned {
+                // A violated limit is a clearer reason than a later search that found no path.
+                Err(_) if refused.is_some() => continue,
+                planned => planned?,
+            };
             let motions = ways.iter().map(|way| self.plan_through(way, joints)).collect::<Result<Vec<_>>>()?;
             let refuse = |motion: &Trajectory| self.limits_from(motion.start()).check(motion.clone()).err();
             match motions.iter().find_map(refuse) {

@@ -77,7 +77,7 @@ impl Watch {
         Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS, velocity_max }
     }
 
-    /// Allows longer gaps between states than [`MAX_SILENCE_SECS`], for an arm whose driver sends fewer.
+    /// Allows longer gaps between states than [`MAX_SILENCE_SECS`], for an arm whose driver sends fewer states.
     pub fn allow_silence(&mut self, max_silence_secs: f64) {
         self.max_silence_secs = max_silence_secs;
     }

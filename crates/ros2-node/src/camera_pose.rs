@@ -23,7 +23,7 @@ pub enum CameraPoseSource {
     Unknown,
     /// The camera file.
     File(CameraOverTable),
-    /// tf; the intrinsics come from the camera file, otherwise from camera_info.
+    /// tf; the intrinsics come from the camera file, or from camera_info if there is no camera file.
     Transforms {
         /// The frame of the robot's base.
         base_frame: String,

@@ -9,7 +9,7 @@ const AGAIN_AFTER: Duration = Duration::from_secs(2);
 /// Maximum number of different messages that are remembered.
 const MAX_REMEMBERED: usize = 200;
 
-/// Prints each message at once, and repetitions of it at most every two seconds, with the number of those not printed.
+/// Prints each message at once, and repetitions at most every two seconds, with the number of repetitions not printed.
 #[derive(Debug, Default)]
 pub(super) struct Lines(Mutex<HashMap<String, (Instant, u64)>>);
 

@@ -41,7 +41,7 @@ impl TeachJob {
     /// Default seed of a request.
     pub const DEFAULT_SEED: u64 = 1;
 
-    /// The job of a request, and the file with the marks that it contained.
+    /// The job of a request, and the file with the marks that the request contained.
     fn read(request: &TeachRequest) -> Result<(Self, Option<TempPath>)> {
         if request.photo_path.is_empty() || request.out_path.is_empty() {
             bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);

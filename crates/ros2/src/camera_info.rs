@@ -18,7 +18,7 @@ fn refused(expected: impl Into<String>, found: impl ToString) -> RosError {
 ///
 /// # Errors
 /// [`RosError::CameraInfo`] for an uncalibrated camera, an invalid camera matrix, a lens model other than plumb_bob
-/// (unless all coefficients are 0), binning, and a region that is not the whole picture.
+/// with 4 or 5 coefficients (unless all coefficients are 0), binning, and a region that is not the whole picture.
 pub fn read_camera_info(message: &CameraInfo) -> Result<PinholeCamera, RosError> {
     let CameraInfo { width, height, distortion_model, d, k, roi, .. } = message;
     if k[0] == 0.0 {

@@ -39,7 +39,7 @@ pub trait Cdr: Sized {
         values.iter().for_each(|value| value.write(to));
     }
 
-    /// Reads `count` elements; the reader has compared the number with the remaining bytes.
+    /// Reads `count` elements; the caller has compared the number with the remaining bytes.
     ///
     /// # Errors
     /// As for [`Cdr::read`].

@@ -74,7 +74,7 @@ impl Transforms {
             *placed = Placed { parent, motion: Motion::Moving(VecDeque::new()) };
         }
         if let Motion::Moving(poses) = &mut placed.motion {
-            // After a clock was set back, the history starts again.
+            // If the clock was set back by more than the history's length, the history starts again.
             if poses.back().is_some_and(|(newest, _)| secs < newest - HISTORY_SECS) {
                 poses.clear();
             }

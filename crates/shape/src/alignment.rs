@@ -1,9 +1,10 @@
 //! How well the directions of a template's edge points agree with those of a picture at a pose, computed for several
 //! points at once.
 //!
-//! Legend: `s` is the picture's direction at a point and `d` the point's own direction, both at twice their angle; `R`
-//! is the rotation by twice the pose's angle. A point adds `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)` to
-//! the sum. Both products are added up over all points, and the rotation is applied once.
+//! Legend: `s` is the picture's direction at a point and `d` the point's own direction, both at twice their angle; `w`
+//! is the point's weight; `R` is the rotation by twice the pose's angle, with its `cos` and `sin`. A point adds
+//! `w s · R d = cos (w s · d) + sin (w s.y d.x − w s.x d.y)` to the sum. Both products are added up over all points,
+//! and the rotation is applied once.
 
 use pulp::{Simd, WithSimd};
 use wide::f32x4;
@@ -24,7 +25,7 @@ struct PointGroup {
     x: [f32; LANES],
     y: [f32; LANES],
     weights: [f32; LANES],
-    /// `w (d.x, d.y, 0, 0)` and `w (−d.y, d.x, 0, 0)`: as long as a sample, so that both products are computed
+    /// `w (d.x, d.y, 0, 0)` and `w (−d.y, d.x, 0, 0)`: four numbers, like a sample, so that x and y are multiplied
     /// together.
     along: [f32x4; LANES],
     across: [f32x4; LANES],

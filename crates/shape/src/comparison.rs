@@ -6,13 +6,13 @@
 //!   └─ climb both ─ better ─ climb both ─┘
 //!                     └─ still poor: climbed from six poses around it ─ refined by edges, kept where both still agree
 //! ```
-//! The edges alone place a part to a fraction of a pixel, but may match the wrong edges: a pipe is shifted along itself
-//! until one flank lies on its shadow. There the agreements of edges and surface are low, but refinement by edges
-//! decides by the consensus of crests. Such poses are therefore refined by edges and surface together, from the result
-//! and from the start. On 480 pictures of eight parts, 960 refinements were started some pixels off: by edges alone, 25
-//! ended beside the part and 60 had an error above 3 px; with the further refinement, 0 and 7. The first percentile of
-//! the agreement of right poses, which differs by part, was 0.32 to 0.59 and is now 0.49 to 0.62. The highest agreement
-//! of a wrong pose rose from 0.48 to 0.56.
+//! Refinement by edges alone places a part to a fraction of a pixel, but may follow the wrong edges: it may shift a
+//! pipe until one flank lies on its shadow. At such a pose the agreements of edges and surface are low, but refinement
+//! by edges does not use them, because it maximises the consensus of crests. Such poses are therefore refined by edges
+//! and surface together, from the refined pose and from the start. On 480 pictures of eight parts, 960 refinements were
+//! started some pixels off: by edges alone, 25 ended beside the part and 60 had an error above 3 px; with the further
+//! refinement, 0 and 7. The first percentile of the agreement of right poses, which differs by part, was 0.32 to 0.59
+//! and is now 0.49 to 0.62. The highest agreement of a wrong pose rose from 0.48 to 0.56.
 
 use std::ops::RangeInclusive;
 
@@ -56,7 +56,7 @@ pub struct Comparison<'a> {
     pub template: &'a ShapeTemplate,
     /// The surface inside its outline.
     pub surface: &'a Surface,
-    /// Its edges over the whole area, compared also where only one of the two has an edge.
+    /// The demonstration's edges over the whole area, compared also where only demonstration or image has an edge.
     pub structure: &'a Structure,
     /// The input of the likeness network.
     pub likeness: &'a Likeness,
@@ -98,19 +98,20 @@ impl Agreement {
         Self { edges, surface, surface_share: config.surface_share }
     }
 
-    /// Both together, in `[0, 1]`: [`AgreementConfig::surface_share`] of the surface.
+    /// Weighted mean of both, in `[0, 1]`; the surface has the weight [`AgreementConfig::surface_share`].
     pub fn both(&self) -> f64 {
         (1.0 - self.surface_share) * self.edges + self.surface_share * self.surface
     }
 }
 
-/// Minimum likeness for computing the details, which saves time; poses below it are refused anyway. Chosen by hand.
+/// Minimum likeness for computing the details. To save time they are not computed below it, because such poses are
+/// refused anyway. Chosen by hand.
 const MIN_LIKENESS: f64 = -4.0;
 
 /// All measurements of a pose in an image, from which the caller computes a score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
-    /// [`ShapeTemplate::agreement`], in `[0, 1]`.
+    /// [`ShapeTemplate::agreement`], in `[0, 1]`; for a part of revolution, its mean with the profile's agreement.
     pub edges: f64,
     /// [`Surface::agreement`], in `[0, 1]`; `None` where the demonstration's surface is plain.
     pub surface: Option<f64>,
@@ -128,7 +129,7 @@ pub struct Evidence {
 /// Where, at a pose, the image differs from the demonstration, to be shown to people; in pixels of the image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Differences {
-    /// Points with an edge in only one of the two, or with edges of different directions.
+    /// Points with an edge in at least one of the two, in regions whose edges disagree.
     pub edges: Vec<Point2<f64>>,
     /// Surface points whose brightness and colour do not follow the demonstration's.
     pub surface: Vec<Point2<f64>>,
@@ -189,7 +190,8 @@ impl Comparison<'_> {
         let (details, mirrored) = parallel::join(details, mirrored);
         CloseLook {
             likeness,
-            // In another roll the part's features are elsewhere.
+            // In another roll angle, the features of a part of revolution are elsewhere, so negative details do not
+            // count.
             details: if self.profile.is_some() { details.map(|details| details.max(0.0)) } else { details },
             mirrored,
             ..look

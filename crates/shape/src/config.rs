@@ -161,9 +161,10 @@ impl Default for StructureConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct AgreementConfig {
-    /// Extent of the part, in level pixels, at the pyramid level where its edges are compared. This level is coarser
-    /// than the finest, so that a pixel of parallax or of lens distortion does not count as another shape. Derived from
-    /// that; no measurement is recorded.
+    /// Minimum extent of the part, in level pixels, at the pyramid level where its edges are compared; a smaller part
+    /// is compared at the finest level. For other parts, this level is usually coarser than the finest, so that a pixel
+    /// of parallax or of lens distortion does not count as another shape. Derived from that; no measurement is
+    /// recorded.
     pub extent: f64,
     /// The weight of the surface in the average with the edges, which have the remaining weight. Fitted on the
     /// simulator's pictures: of 950 right poses, 30 scored below a wrong one with weights 7 : 2 : 1 of edges, cells and

@@ -114,7 +114,7 @@ fn best_fit(sightings: &Sightings<4>, is_free: [bool; 4], mut steps: Vec<Vector4
     scored.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Vector4::zeros(), 0.0))
 }
 
-/// No movement, and one step each way by shift and by scale.
+/// No movement; with [`Starts::Around`], also one step each way by shift and by scale.
 fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
     let mut starts = vec![Vector4::zeros()];
     let directions: &[usize] = if first == Starts::Around { &[0, 1, 3] } else { &[] };

@@ -134,7 +134,7 @@ fn crest_at(level: &GradientLevel, col: usize, row: usize) -> Option<(Point2<f64
         Some(along.max(0.0).sqrt())
     };
     let (before, here, after) = (strength(-1.0)?, strength(0.0)?, strength(1.0)?);
-    // `<=` on one side only, so that one of two equal neighbours is kept.
+    // `>=` on one side only, so that one of two equal neighbours is kept.
     if before > here || after >= here {
         return None;
     }
@@ -185,7 +185,7 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
             }
         }
         // Nine tenths of the requested points are enough: a smaller distance would give more points, but fewer in weak
-        // regions. Both shares trade time for an even spread; chosen by hand.
+        // regions. The factors 9/10 and 0.85 trade time for an even spread; chosen by hand.
         if kept.len() >= max_points * 9 / 10 || distance < 0.5 * pixel_size {
             return kept;
         }

@@ -40,8 +40,8 @@ impl ShapeTemplate {
         1 << pixel_size.max(1.0).log2().round() as u32
     }
 
-    /// Moves a pose onto the edges; its error may be at most about six pixels of the agreement's level (for a part of
-    /// 128 pixels, twelve image pixels). Deterministic.
+    /// Moves a pose onto the edges. The start's error may be at most about six pixels of the level at which agreement
+    /// is computed (for a part of 128 pixels, twelve image pixels). Deterministic.
     ///
     /// # Units and frames
     /// Poses map demonstration pixels to pixels of the image the field was computed from.

@@ -1,8 +1,8 @@
 //! Foreshortening of a part compared with the photo, from the slant of an uncalibrated camera.
 //!
 //! A camera tilted by t from the vertical shows a flat part shortened by cos t in one direction of the image. Starting
-//! from a pose (angle, shift and scale), the part's edge points are followed to an affine map of six coordinates, by
-//! the same consensus of crests as [`crate::consensus`].
+//! from a pose (angle, shift and scale), an affine map with six coordinates is fitted to the part's edge points, by the
+//! same consensus of crests as in [`crate::consensus`].
 
 use nalgebra::{Matrix2, Point2, SVector, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
@@ -48,8 +48,8 @@ struct Affine {
 }
 
 impl ShapeTemplate {
-    /// The shortening of the part near `start`; `None` for an impossible pose, or if the part is shortened more than at
-    /// the maximum tilt.
+    /// The shortening of the part near `start`; `None` if the pose has no inverse, or if the part is shortened more
+    /// than at the maximum tilt.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.
@@ -127,7 +127,7 @@ fn radius(level: &TemplateLevel, image_pixel_size: f64, pose: &Affine) -> f64 {
     (level.radius_px * pose.linear.determinant().abs().sqrt() / image_pixel_size).max(1.0)
 }
 
-/// The crests of the edge points at an affine pose; `None` for an impossible pose.
+/// The crests of the edge points at an affine pose; `None` if the pose has no inverse.
 fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reach: usize) -> Option<Sightings<6>> {
     let pixel = matched.image_pixel_size;
     let normal_map = pose.linear.try_inverse()?.transpose();

@@ -28,6 +28,7 @@
 //! | edge point | a point of the demonstration's edges: offset from the centre, normal, weight; weights of a level sum to 1 |
 //! | alignment | cos 2(φ of the edge point − φ of the image there), in [-1, 1] |
 //! | agreement | weighted mean of alignments (edges), or of correlations (surface), in [0, 1] |
+//! | agreement's level | the pyramid level of the template at which agreement is computed |
 //! | crest | a local maximum of the gradient's energy along an edge point's normal |
 //! | bank | the template turned and scaled in all variants that the search tries |
 //! | place, pitch | where the search puts the part's centre, and the distance between two such places |

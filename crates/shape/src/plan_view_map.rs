@@ -62,7 +62,8 @@ impl PlanViewMap {
         Self { width, height, columns: columns as usize, nodes, samples: (widest.ceil() as usize).min(MAX_SAMPLES) }
     }
 
-    /// The plan view of a picture. Outside the picture it repeats the picture's border, so that no edge appears.
+    /// The plan view of a picture. Outside the picture it repeats the picture's border, so that no edge appears. Where
+    /// the camera sees nothing at all, it is black.
     pub fn resample(&self, picture: &RgbImage) -> RgbImage {
         self.resample_window(picture, &PixelRect { left: 0, top: 0, width: self.width, height: self.height })
     }
@@ -77,8 +78,8 @@ impl PlanViewMap {
         RgbImage::from_raw(window.width, window.height, rows.concat()).unwrap_or_default()
     }
 
-    /// The picture positions of both ends of a line across a column of cells, `down` pixels below the top of row `y`;
-    /// `None` where the lens shows nothing.
+    /// The picture positions of both ends of a horizontal line across one cell of a column of cells, `down` pixels
+    /// below the top of row `y`; `None` where the lens shows nothing.
     fn cell_line(&self, column: u32, y: u32, down: f64) -> Option<[Vector2<f64>; 2]> {
         let below = (f64::from(y % CELL) + down) / f64::from(CELL);
         let at = (y / CELL) as usize * self.columns + column as usize;

@@ -34,7 +34,7 @@ impl Pose {
         }
     }
 
-    /// Whether every coordinate differs by less than a unit of (x, y, angle, ln scale).
+    /// Whether every coordinate (x, y, angle, ln scale) differs by less than its unit.
     pub(crate) fn is_near(&self, other: &Self, units: [f64; 4]) -> bool {
         (self.center.x - other.center.x).abs() < units[0]
             && (self.center.y - other.center.y).abs() < units[1]

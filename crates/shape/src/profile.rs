@@ -1,7 +1,8 @@
 //! The position of a part of revolution along its axis, and which end is which.
 //!
-//! In a roll other than the photo's the threads are shifted along the part and its light has changed, so that edges
-//! inside its outline shift a pose along the axis or turn it end for end. The profile is the same in every roll.
+//! In a roll angle (rotation about the axis) other than the photo's the threads are shifted along the part and its
+//! light has changed, so that edges inside its outline shift a pose along the axis or turn it end for end. The profile
+//! is the same in every roll.
 
 use std::ops::RangeInclusive;
 
@@ -21,7 +22,7 @@ const NUM_SHIFTS: i32 = 4;
 const SHIFT: f64 = 0.03;
 /// Largest movement of a pose from its shifted start.
 const REACH: Reach = Reach { shift_px: 4.0, turn_rad: 0.06, log_scale: 0.03 };
-/// Minimum gain of the profile's agreement, and largest loss of the agreement of all edges.
+/// Minimum gain of the profile's agreement by a change of the pose, and largest loss of the agreement of all edges.
 const MIN_GAIN: f64 = 0.05;
 /// Number of steps into which a shift is divided. Chosen by hand: the largest shifts are of nine pixels.
 const SHARES: usize = 8;
@@ -37,7 +38,7 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// `None` for other parts.
+    /// `None` for other parts, and if the outline has too few edges.
     pub(crate) fn of(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Option<Self> {
         let revolution = Revolution::of(image, outline)?;
         let template = ShapeTemplate::of_outline(image, outline, config).ok()?;

@@ -1,7 +1,8 @@
 //! Parts of revolution, which lie on their side at any roll angle: screws, pins, fittings.
 //!
 //! Their outline is its own mirror image about a long axis, and the light on them changes across that axis in the same
-//! way along its whole length. On a flat part it does not: docs/decisions/028-parts-of-revolution.md.
+//! way along its whole length. On a flat part the light does not change in this way
+//! (docs/decisions/028-parts-of-revolution.md).
 
 use image::RgbImage;
 use nalgebra::{Point2, Rotation2, Vector2};
@@ -31,8 +32,8 @@ const ALONG: usize = 40;
 const ACROSS: usize = 8;
 /// Share of the radius that is used: pixels nearest to the outline show the background.
 const INNER: f64 = 0.8;
-/// A point further from the axis, in mean radii, belongs to a wing: heads and hexagons of the parts above reach up to
-/// 1.9, the wings of a wing bolt 2.9.
+/// A point further from the axis, in mean radii, belongs to a wing: heads and hexagons of the parts measured for
+/// [`MIN_SYMMETRY`] reach up to 1.9, the wings of a wing bolt 2.9.
 const MAX_RADIUS_OVER_MEAN: f64 = 2.3;
 
 /// The axis of a part of revolution, as its photo shows it.
@@ -45,7 +46,7 @@ pub struct Revolution {
 }
 
 impl Revolution {
-    /// The axis of the part that `outline` encloses; `None` for other parts.
+    /// The axis of the part that `outline` encloses; `None` if it is not a part of revolution.
     ///
     /// # Units and frames
     /// `outline` is in pixels of `cutout`.

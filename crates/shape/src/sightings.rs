@@ -1,7 +1,7 @@
 //! The observations of a template's edge points in a picture: the gradient crests near each point along its normal.
 //!
 //! Points are stored in groups of [`LANES`], coordinate by coordinate, so that the fits ([`crate::consensus`]) process
-//! a group at once. All sums use the same order with any instructions.
+//! a group at once. All sums are computed in the same order on every machine.
 
 use pulp::{Simd, WithSimd};
 use wide::f32x4;
@@ -38,8 +38,9 @@ pub(crate) struct EdgePlace<const N: usize> {
 pub(crate) struct Group<const N: usize> {
     pub(crate) rows: [[f32; LANES]; N],
     pub(crate) weights: [f32; LANES],
-    /// Distance of each crest along the normal; a trust of 0 means no crest.
+    /// Distance of each crest along the normal.
     pub(crate) distances: [[f32; LANES]; MAX_CRESTS],
+    /// Trust in each crest: the alignment of its direction with the edge point's; 0 means no crest.
     pub(crate) trusts: [[f32; LANES]; MAX_CRESTS],
 }
 
@@ -124,7 +125,7 @@ fn seen<const N: usize>(level: &GradientLevel, place: &EdgePlace<N>, reach: usiz
 fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Option<[(f32, f32); MAX_CRESTS]> {
     let len = 2 * reach + 3;
     let middle = (reach + 1) as f32;
-    // Crests of the gradient's strength: roots are computed at crests only.
+    // The squared gradient has the same crests as the gradient, so square roots are computed only at crests.
     let mut squares = [0.0f32; 2 * LANES];
     let mut trusts = [0.0f32; 2 * LANES];
     for (k, sample) in samples.iter().enumerate() {

@@ -1,8 +1,9 @@
 //! The surface inside the outline, compared by correlations of brightness and colour.
 //!
-//! The edges of a lever with nearly the outline of the taught part agree (0.71 to 0.75; the part itself in poor light
-//! has 0.64), but the lever has a hole in place of the part's bushing. The surface shows this: brightness and colour
-//! inside the outline, compared as correlations, so that the light's strength and tint do not count.
+//! Edges alone do not distinguish a lever whose outline is nearly that of the taught part: their agreement is 0.71 to
+//! 0.75, and that of the part itself in poor light is 0.64. The lever has a hole in place of the part's bushing.
+//! Brightness and colour inside the outline show this difference. They are compared as correlations, so that the
+//! strength and tint of the light do not count.
 //!
 //! ```text
 //! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
@@ -34,7 +35,8 @@ const MIN_IN_CELL: usize = 4;
 /// Points within this distance of the outline show the background when the pose is wrong by a pixel. Derived from this
 /// error, not measured.
 const EDGE_MARGIN_PX: f64 = 2.0;
-/// Minimum grey value of a colour with a hue. Chosen by hand, not measured.
+/// Added to each channel, in grey values, so that a nearly black colour has hardly any hue. Chosen by hand, not
+/// measured.
 const DARK: f64 = 3.0;
 /// Range of the saturation, as a multiple of the taught saturation, that highlights and shadows may cause. Chosen by
 /// hand, not measured.
@@ -161,7 +163,7 @@ impl Surface {
         points().filter(|point| is_inside(point)).count() as f64 / (points().count() as f64).max(1.0)
     }
 
-    /// Mean brightness of the image at a pose over that of the cut-out; 1 where none of it is in the image.
+    /// Mean brightness of the image at a pose divided by that of the cut-out; 1 where none of it is in the image.
     pub(crate) fn brightness(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let (mut taught, mut seen) = (0.0, 0.0);
         for cell in self.correlations(image, image_from_cutout) {
@@ -247,7 +249,7 @@ struct Correlation {
 
 impl Correlation {
     /// Converts sums (of `taught`, `seen`, their squares and their products) of colours relative to one colour of the
-    /// photo and one of the image.
+    /// photo and one of the image to sums of the colours themselves.
     fn about(
         [of_photo, of_image]: [[f64; 3]; 2],
         count: f64,

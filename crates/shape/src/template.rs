@@ -127,9 +127,8 @@ impl ShapeTemplate {
 
     /// The agreement of the part's edges at this pose with the image's, in `[0, 1]`.
     ///
-    /// At 1, every edge of the demonstration lies on an edge of the same direction. Random directions
-    /// and areas without edges give 0. Points outside the image do not count, unless there are too
-    /// many.
+    /// At 1, every edge of the demonstration lies on an edge of the same direction. Random directions and areas without
+    /// edges give 0. Points outside the image do not count, as long as they have at most 40 % of the weight.
     ///
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image the field was computed from.

@@ -1,4 +1,4 @@
-//! Refinement by edges and surface colours together, of poses that refinement by edges alone left wrong.
+//! Tests of refinement by edges and surface together, and of the close look.
 
 use crate::scenes;
 use image::{Rgb, RgbImage};

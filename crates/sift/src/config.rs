@@ -38,8 +38,8 @@ pub enum DescriptorNormalization {
     /// # Source
     /// Lowe 2004, section 6.1.
     Clipped,
-    /// As `Clipped`, then divided by the sum of its numbers, and the square root of each: the Euclidean distance is
-    /// then the Hellinger distance of the histograms.
+    /// As `Clipped`; then each number is divided by the sum of all numbers and replaced by its square root. The
+    /// Euclidean distance is then proportional to the Hellinger distance of the histograms.
     ///
     /// # Source
     /// Arandjelović and Zisserman 2012 (RootSIFT).

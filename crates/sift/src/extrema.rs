@@ -147,7 +147,7 @@ fn spread(from: &[f32], to: &mut [f32], pick: impl Fn(f32, f32) -> f32) {
     }
 }
 
-/// `f32::max` for numbers, in one instruction, because NaN does not occur.
+/// `f32::max` without its handling of NaN, which does not occur here; this is one instruction.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -158,8 +158,8 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Moves to the neighbouring sample as long as the fitted extremum is nearer to it. `None` if this does not
-/// converge.
+/// Moves to the sample nearest to the fitted extremum until the extremum is within half a sample. `None` if this does
+/// not converge.
 fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<Sample> {
     for _ in 0..MAX_STEPS {
         let offset = Derivatives::at(octave, at).offset()?;
@@ -231,7 +231,7 @@ impl Derivatives {
         offset.iter().all(|v| v.is_finite()).then_some(offset)
     }
 
-    /// Whether the principal curvatures in the image differ by more than `ratio`, or in sign.
+    /// Whether the principal curvatures in the image differ by a factor of at least `ratio`, or in sign.
     fn is_edge(&self, ratio: f64) -> bool {
         let h = &self.hessian;
         let (trace, determinant) = (h.m11 + h.m22, h.m11 * h.m22 - h.m12 * h.m12);

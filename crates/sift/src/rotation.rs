@@ -123,7 +123,8 @@ impl RotationEstimator {
     /// image is taken for the part.
     ///
     /// # Errors
-    /// A mask whose size differs from the image's; a template with neither keypoints nor a mask.
+    /// A mask whose size differs from the image's; a template with fewer than three keypoints and without a usable
+    /// mask.
     pub fn template(&self, image: &Plane, mask: Option<&Mask>) -> Result<RotationTemplate, SiftError> {
         let features = self.features(image, mask)?;
         let silhouette = mask.and_then(Silhouette::new);

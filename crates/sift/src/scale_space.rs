@@ -11,7 +11,8 @@
 use crate::blur::{GaussianKernel, blur, double, halve};
 use crate::{Plane, SiftConfig};
 
-/// Minimum distance of extrema from the border, so that the mirrored image does not affect their derivatives.
+/// Minimum distance of extrema from the border, in pixels of the octave. Nearer to the border, the mirrored image
+/// affects their derivatives most.
 pub(crate) const BORDER: usize = 5;
 
 /// The levels of one octave.
@@ -51,7 +52,7 @@ pub(crate) struct PlanePool(Vec<Vec<f32>>);
 
 impl PlanePool {
     fn plane(&mut self, width: usize, height: usize) -> Plane {
-        // Planes are returned in the order in which they were made, so the last one is usually of the wanted size.
+        // The pool is filled in reverse order, so its last plane is usually of the wanted size.
         Plane::recycled(width, height, self.0.pop().unwrap_or_default())
     }
 

@@ -28,7 +28,8 @@ const MAX_ITERATIONS: usize = 12;
 /// Radius in pixels around an outline point within which the mask's pixels determine its normal: large enough to smooth
 /// the pixel steps.
 const NORMAL_WINDOW: i64 = 4;
-/// Fraction of the nearest points that is used; the rest may belong to specks, shadows or objects that cover the part.
+/// Fraction of the point pairs that is used, the nearest first; the rest may belong to specks, shadows or objects that
+/// cover the part.
 const TRIM: f64 = 0.85;
 /// Minimum difference between rotations that count as distinct, in radians.
 const DISTINCT_TURN: f64 = 20.0 * TAU / 360.0;
@@ -214,7 +215,8 @@ fn thinned<T: Copy>(points: &[T], count: usize) -> Vec<T> {
     points.iter().step_by(points.len().div_ceil(count)).copied().collect()
 }
 
-/// The extent of the part in each direction: the sum of the distances of its pixels, minus the mean, of unit length.
+/// The extent of the part in each direction: the sum of the distances of its pixels from the centre. The mean of these
+/// sums is subtracted, and the result is scaled to unit length.
 fn profile(pixels: &[Point2<f64>], centroid: &Point2<f64>) -> Vec<f64> {
     let mut profile = vec![0.0; NUM_DIRECTIONS];
     for pixel in pixels {
@@ -232,7 +234,7 @@ fn profile(pixels: &[Point2<f64>], centroid: &Point2<f64>) -> Vec<f64> {
 }
 
 /// The rotations of the highest profile correlations, and the best one rotated by 90°, 180° and 270°, to detect an
-/// outline that fits these equally well.
+/// outline that fits equally well at these rotations.
 fn starts(template: &[f64], image: &[f64]) -> Vec<Angle> {
     let correlation = |shift: usize| -> f64 {
         template.iter().enumerate().map(|(i, v)| v * image[(i + shift) % NUM_DIRECTIONS]).sum()

@@ -161,8 +161,8 @@ struct Errors {
     wider_m: f64,
     picture_age_secs: f64,
     table_m: f64,
-    /// Probability, for each state and for each command, that losses begin with it; [`Self::lost_in_a_row`] states or
-    /// commands in a row are then lost.
+    /// Probability for each state and for each command that losses begin: [`Self::lost_in_a_row`] states or commands in
+    /// a row are then lost.
     lost: f64,
     lost_in_a_row: u64,
 }

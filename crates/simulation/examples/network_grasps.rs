@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
 //!
-//! Ends with an error if an attempt in lockstep and the same one in one process differ in whether the part is held, or
-//! if the number of held parts in real time is lower than in one process by more than 5 per 240 attempts.
+//! In lockstep, ends with an error if an attempt holds the part over the network but not in one process, or the other
+//! way round. In real time, ends with an error if fewer parts are held over the network than in one process, by more
+//! than 5 per 240 attempts.
 
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};

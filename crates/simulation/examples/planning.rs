@@ -4,21 +4,23 @@
 //! - `rate`: configurations that the collision model checks per second on one core.
 //! - `proof`: plans COUNT problems, computes the motion along each path at Franka's full limits, and checks the motion
 //!   for collisions in MuJoCo at steps of 1 ms. It prints the largest fraction of each limit of the joints (velocity,
-//!   acceleration, jerk, torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). It also
-//!   gives the ratios of the durations to those with a stop at every waypoint and to those without a jerk limit.
+//!   acceleration, jerk, torque by MuJoCo's inverse dynamics) and of the tcp (velocity, acceleration, jerk). For plans
+//!   that are not straight, it also compares the duration with others, such as the duration with a stop at every
+//!   waypoint and the duration without a jerk limit.
 //!
-//! - `checks`: number of configurations that the search checks until it reaches one given goal configuration, without
-//!   those for shortening; other planners are measured in the same way (benches/peers/ompl_planning.py).
+//! - `checks`: number of configurations that the search checks until it reaches one given goal configuration. Checks
+//!   for shortening the path are not counted. Other planners are measured in the same way
+//!   (benches/peers/ompl_planning.py).
 //! - `length`: the duration of a plan compared with the best duration found in SECONDS (60) of processor time: the same
 //!   planner is repeated with other seeds, with 8 instead of 12 searches, and with fifty times as many attempts to
 //!   shorten the path. It uses COUNT (50) problems whose goal cannot be reached by a straight motion.
 //!
-//! `rate` and `proof` are timed by the clock and by the thread's processor time, as Linux reports it, which does not
-//! depend on other programs on the machine.
+//! `rate` and `proof` measure the time by the clock and the thread's processor time. The processor time, as Linux
+//! reports it, does not depend on other programs on the machine.
 //! - `serve`: answers collision checks on standard input, for other planners (benches/peers/ompl_planning.py). The
 //!   input is a problem's seed as u64 (u64::MAX ends the program), which is answered by the start and goal
-//!   configurations (14 f64). Then follow any number of configurations (7 f64), each answered by a byte (1 is free),
-//!   until a configuration of seven NaN. All numbers are little-endian.
+//!   configurations (14 f64). Any number of configurations (7 f64) follow, each answered by a byte (1 is free), until a
+//!   configuration of seven NaN. All numbers are little-endian.
 
 use std::error::Error;
 use std::io::{Read, Write};

@@ -62,13 +62,14 @@ impl Workcell {
         }
     }
 
-    /// One cycle of a motion or of standing still, in which the arm may stop itself.
+    /// Advances one cycle, in motion or at rest; returns the reason if the arm must stop.
     fn cycle(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         self.tick()?;
         self.observe_moving(watch)
     }
 
-    /// Passes the state of a cycle to `watch`; the arm may stop itself.
+    /// Passes the state of a cycle to `watch`, and returns the reason if the arm must stop. A reflex fault that is due
+    /// stops the arm and is returned as an error.
     pub(crate) fn observe_moving(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         if self.fault() == Some(ArmFaultKind::Reflex) && !self.is_in_reflex {
             self.is_in_reflex = true;

@@ -68,7 +68,8 @@ pub struct AttemptErrors {
     pub shake: Option<Shake>,
     /// The arm's fault.
     pub arm_fault: Option<ArmFault>,
-    /// Dry friction in every joint while the arm is driven by torques, N·m; position control compensates friction.
+    /// Dry friction in every joint while the arm is driven by torques, N·m. Under position control, the joints have no
+    /// dry friction.
     pub joint_friction_nm: f64,
 }
 

@@ -69,7 +69,7 @@ impl CollisionWorld {
     /// All overlaps at a configuration.
     ///
     /// # Errors
-    /// [`crate::SimulationError::Unstable`] for positions that are not finite.
+    /// [`crate::SimulationError::Unstable`] for positions that are not finite, and if MuJoCo's list of contacts is full.
     pub fn overlaps(&mut self, q: &JointVector) -> Result<Vec<Overlap>> {
         self.ids.set_position(&mut self.data, q);
         self.data.collide()?;

@@ -48,15 +48,15 @@ fn felt_n(panda: &ArmGeometry, ids: &PandaIds, data: &Data) -> f64 {
 }
 
 impl Workcell {
-    /// Updates the filtered vertical force on the hand and its largest value.
+    /// Updates the filtered vertical force on the hand and its largest absolute value.
     pub(crate) fn feel(&mut self) {
         let gain = PERIOD_SECS / (PERIOD_SECS + 1.0 / (std::f64::consts::TAU * CUTOFF_HZ));
         self.felt_n += (felt_n(&self.panda, &self.panda_ids, &self.data) - self.felt_n) * gain;
         self.peak_felt_n = self.peak_felt_n.max(self.felt_n.abs());
     }
 
-    /// The largest vertical force on the hand since the last call, N, as a robot estimates it; includes the load's
-    /// weight.
+    /// The largest absolute value of the vertical force on the hand since the last call, N, as a robot estimates it.
+    /// The force includes the load's weight.
     pub fn take_peak_felt_n(&mut self) -> f64 {
         std::mem::take(&mut self.peak_felt_n)
     }

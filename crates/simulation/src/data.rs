@@ -137,9 +137,11 @@ impl Data {
         self.check()
     }
 
-    /// Returns an error for invalid numbers and for a full list of contacts or constraints. In these cases MuJoCo only
-    /// warns, and resets the state after invalid numbers.
+    /// Returns an error for positions or velocities that are not finite, and if MuJoCo has warned of invalid numbers or
+    /// of a full list of contacts or constraints. After invalid numbers in a time step, MuJoCo resets the state.
     fn check(&self) -> Result<()> {
+        // MuJoCo looks for such numbers in time steps only.
+        let is_finite = self.qpos().iter().chain(self.qvel()).all(|number| number.is_finite());
         let bad = [
             mj::mjWARN_BADQPOS,
             mj::mjWARN_BADQVEL,
@@ -148,7 +150,7 @@ impl Data {
             mj::mjWARN_CONTACTFULL,
             mj::mjWARN_CNSTRFULL,
         ];
-        if bad.iter().any(|&warning| self.raw().warning[warning as usize].number > 0) {
+        if !is_finite || bad.iter().any(|&warning| self.raw().warning[warning as usize].number > 0) {
             let message = take_warnings().pop().unwrap_or_else(|| "a number is not finite or too large".into());
             return Err(SimulationError::Unstable { time_secs: self.time_secs(), message });
         }

@@ -91,8 +91,8 @@ mod tests {
         }
     }
 
-    /// Tests that every visible shape of the arm is inside one wide capsule of its link, so that links with separate
-    /// capsules are separate.
+    /// Tests that every visible shape of the arm is inside one wide capsule of its link. Links whose capsules do not
+    /// touch therefore do not touch either.
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
         use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};

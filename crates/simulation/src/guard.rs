@@ -1,9 +1,10 @@
 //! MuJoCo's error and warning handlers, made safe for Rust.
 //!
 //! By default MuJoCo writes its errors to a file and ends the process. With these handlers, an error unwinds from the
-//! handler through MuJoCo (which is built with unwind tables, and whose functions are bound as `C-unwind`) to
-//! [`guarded`], which converts it to a [`SimulationError::MuJoCo`]. Memory that MuJoCo allocated during the call is
-//! leaked, and its data is incomplete; callers return the error and do not use that data again.
+//! handler through MuJoCo to [`guarded`], which converts it to a [`SimulationError::MuJoCo`]. For this purpose, MuJoCo
+//! is built with unwind tables, and its functions are bound as `C-unwind`. Memory that MuJoCo allocated during the call
+//! is leaked, and the structs that the call was writing are incomplete. Callers return the error and do not use these
+//! structs again.
 
 use std::any::Any;
 use std::cell::RefCell;

@@ -54,7 +54,7 @@ impl InverseDynamics {
     /// The torques (N·m) of a motion: positions in rad, velocities in rad/s, accelerations in rad/s².
     ///
     /// # Errors
-    /// [`crate::SimulationError::Unstable`] for numbers that are not finite.
+    /// [`crate::SimulationError::MuJoCo`] if MuJoCo stops. Numbers that are not finite are no error.
     pub fn torques_nm(&mut self, q: &ArmVector, velocity: &ArmVector, acceleration: &ArmVector) -> Result<ArmVector> {
         self.ids.set_position(&mut self.data, q);
         let joints = *self.ids.qvel_indices();

@@ -27,7 +27,7 @@ pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> Gra
 pub fn part_shape(spec: &ObjectSpec) -> Result<PartShape> {
     let part_from_object = marked_grasp(spec, &Isometry3::identity()).base_from_tcp.inverse();
     let outline = spec.footprint.iter().map(|p| (part_from_object * Point3::new(p.x, p.y, 0.0)).xy());
-    // The marks of a round bar are at the height of its axis, those of other parts on top.
+    // The marks of a round bar are at the height of its axis; the marks of other parts are on top of the part.
     let top_m = spec.mark_height_m.max(2.0 * spec.grasp_height_m);
     Ok(PartShape::new(outline, spec.jaw_width_m, top_m, spec.grasp_height_m)?)
 }

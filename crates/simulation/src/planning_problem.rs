@@ -55,16 +55,16 @@ impl PlanningProblem {
         Self { obstacles, base_from_goal: ArmGeometry::panda().forward(&goal), start, goal, model }
     }
 
-    /// The problem of a seed with up to [`Self::MAX_ADDED`] more obstacles: each is a ball at the midpoint of the tcp's
-    /// path, as long as a straight motion solves the problem. Without these balls, a straight motion solves nearly all
-    /// random problems.
+    /// The problem of a seed with up to [`Self::MAX_ADDED`] more obstacles. As long as a straight motion solves the
+    /// problem, a ball is added at the midpoint of the tcp's path. Without these balls, a straight motion solves nearly
+    /// all random problems.
     pub fn obstructed(seed: u64) -> Self {
         let panda = ArmGeometry::panda();
         let mut problem = Self::random(seed);
         for number in 0..Self::MAX_ADDED {
             let options = PlanOptions::default();
             let plan = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
-            // A problem that needs a curved path, or for which none is found, is hard enough.
+            // A problem that needs a curved path, or for which no path is found, is hard enough.
             let Some([from, to]) = plan.ok().and_then(|plan| <[JointVector; 2]>::try_from(plan.waypoints).ok()) else {
                 break;
             };

@@ -262,7 +262,7 @@ impl Renderer {
 impl Drop for Renderer {
     fn drop(&mut self) {
         let _lock = drawing_lock();
-        // If the context cannot be made current, OpenGL's objects are freed together with it.
+        // If the context cannot be made current, OpenGL's objects are not freed and stay in the context.
         if let Ok(_current) = self.context.make_current() {
             // SAFETY: the context was made by `mjr_makeContext` and is freed once.
             unsafe { mj::mjr_freeContext(&raw mut *self.gl) };

@@ -10,8 +10,8 @@ use crate::model::{Geom, Id, Kind, Model};
 const CHAIN: [&str; 9] = ["link0", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand"];
 /// MuJoCo's group of collision shapes.
 const COLLISION_GROUP: i32 = 3;
-/// Minimum difference of the places in the chain of two bodies that are compared: the capsules of closer bodies may
-/// overlap in every posture, as at the elbow and the wrist.
+/// Two bodies are compared only if their places in the chain differ by at least this number. The capsules of closer
+/// bodies may overlap in every posture, as at the elbow and the wrist.
 const MIN_JOINTS_APART: usize = 4;
 
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::collision::{Checker, CollisionModel};
 use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
-use sdg_simulation::{CollisionWorld, random_obstacles};
+use sdg_simulation::{CollisionWorld, SimulationError, random_obstacles};
 
 /// Largest depth of an overlap in MuJoCo that the model misses, m.
 const MAX_MISSED_M: f64 = 0.003;
@@ -18,6 +18,18 @@ fn random_configurations(count: usize, rng: &mut Pcg64Mcg) -> Vec<JointVector> {
     (0..count)
         .map(|_| JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i])))
         .collect()
+}
+
+#[test]
+fn a_configuration_that_is_not_finite_is_no_free_one() {
+    let mut world = CollisionWorld::new(&[], 0.08).unwrap();
+    let mut q = sdg_kinematics::ready_pose();
+    assert!(world.deepest(&q).is_ok());
+    for value in [f64::NAN, f64::INFINITY] {
+        q[3] = value;
+        assert!(matches!(world.deepest(&q), Err(SimulationError::Unstable { .. })), "{value}");
+    }
+    assert!(world.deepest(&sdg_kinematics::ready_pose()).is_ok());
 }
 
 #[test]

@@ -9,7 +9,8 @@ use sdg_robot::{GraspConfig, GraspOutcome, Load, Robot, Watch, grasp};
 use sdg_simulation::Workcell;
 use sdg_simulation::objects::ObjectSpec;
 
-/// The finger tips in the flange's frame, m.
+/// The centre of mass that is given to the robot for the part, in the flange's frame, m. The measured vertical force
+/// does not depend on it.
 const TIPS_IN_FLANGE_M: [f64; 3] = [0.0, 0.0, 0.2104];
 
 #[test]

@@ -68,8 +68,8 @@ impl AdamW {
         AdamWState { step: self.step, moments }
     }
 
-    /// Restores the optimiser of `module` at the time of [`Self::state`]. Moments of parameters that the module lacks,
-    /// or has in a different size, are left out.
+    /// The optimiser of `module` with a state from [`Self::state`]. Moments of parameters that the module lacks, or has
+    /// in a different size, are left out.
     pub fn with_state<M: Module>(mut self, module: &M, state: &AdamWState) -> Self {
         self.step = state.step;
         self.moments.clear();

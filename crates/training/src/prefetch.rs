@@ -25,8 +25,8 @@ pub(crate) struct Batches<K, B> {
 }
 
 impl<K: Copy + PartialEq, B> Batches<K, B> {
-    /// The requested batch. The following batches are requested on the assumption that the kind does not change; if it
-    /// did, they are discarded, so the training depends only on the requests and not on the threads' speed.
+    /// The requested batch. The following batches are requested on the assumption that the kind does not change. If the
+    /// kind changes, they are discarded, so the training depends only on the requests and not on the threads' speed.
     pub(crate) fn next(&mut self, wanted: BatchRequest<K>) -> Result<B, TrainingError> {
         if self.pending.front().is_some_and(|first| *first != wanted) {
             while self.pending.pop_front().is_some() {

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// One cycle: a cosine up to `peak` during warm-up, then a cosine down to nearly zero.
 ///
 /// # Source
-/// Smith and Topin 2018, with the factors of PyTorch's `OneCycleLR`, of which the second is here relative to the peak.
-/// With Detectron2's default warm-up of 1000 iterations the learning rate of the paper's 1000-iteration runs only
-/// increases; this schedule avoids that.
+/// Smith and Topin 2018, with the two factors of PyTorch's `OneCycleLR`. The second factor divides the peak here, and
+/// the first learning rate in PyTorch. With Detectron2's default warm-up of 1000 iterations the learning rate of the
+/// paper's 1000-iteration runs only increases; this schedule avoids that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OneCycle {
     /// Maximum learning rate.

@@ -11,7 +11,7 @@ extern "C" {
     fn error(message: &str);
 }
 
-/// Makes a panic, which stops the module permanently, print its position.
+/// Makes a panic print its position; a panic stops the module permanently.
 #[wasm_bindgen(start)]
 fn start() {
     std::panic::set_hook(Box::new(|panic| error(&panic.to_string())));
@@ -41,7 +41,7 @@ impl Model {
     /// Detects in a PNG or JPEG file; see [`Detector::detect_in_file`].
     ///
     /// # Errors
-    /// A file that is not an image, is damaged, or is too large.
+    /// A file that is not an image, is damaged, or is too large; an error of the search.
     #[wasm_bindgen(js_name = detectInFile)]
     pub async fn detect_in_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
         Ok(self.0.detect_in_file(bytes, verification(verify)).await?)
@@ -50,7 +50,7 @@ impl Model {
     /// Detects in the pixels of a canvas; see [`Detector::detect_in_pixels`].
     ///
     /// # Errors
-    /// The number of bytes does not match the size, or the image is too large.
+    /// The number of bytes does not match the size, or the image is too large; an error of the search.
     #[wasm_bindgen(js_name = detectInPixels)]
     pub async fn detect_in_pixels(
         &self,

@@ -46,7 +46,7 @@ impl Detector {
     /// Detects in a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, including refused detections.
     ///
     /// # Errors
-    /// The file is not an image, is damaged, or has more than 64 megapixels.
+    /// The file is not an image, is damaged, or has more than 64 megapixels; an error of the search.
     pub async fn detect_in_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
         self.detect_in(&decode_image(bytes, &LIMITS)?, verification).await
     }
@@ -54,7 +54,7 @@ impl Detector {
     /// Detects in opaque pixels of a canvas: rows of red, green, blue and an ignored alpha.
     ///
     /// # Errors
-    /// The number of bytes does not match the size, or the image has more than 64 megapixels.
+    /// The number of bytes does not match the size, or the image has more than 64 megapixels; an error of the search.
     pub async fn detect_in_pixels(
         &self,
         rgba: &[u8],

@@ -131,7 +131,7 @@ impl Browser {
     /// Repeats a script until its result is truthy, and returns the result.
     ///
     /// # Errors
-    /// The timeout passed; the error quotes the page's text.
+    /// The script threw, or the timeout passed; the error after a timeout quotes the page's text.
     pub fn wait_for(&self, what: &str, script: &str) -> Result<Value> {
         let begun = Instant::now();
         while begun.elapsed() < self.patience {

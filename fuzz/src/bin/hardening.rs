@@ -2,7 +2,7 @@
 //! earlier run; `--seconds` limits the time of all targets together. `hardening --input FILE TARGET` executes a target
 //! once and prints its panic in full.
 //!
-//! A target's figures are in DIR/TARGET.json, and each input that broke a promise is in DIR/TARGET-NUMBER.bin.
+//! A target's figures are in DIR/TARGET.json, and each input that caused a failure is in DIR/TARGET-NUMBER.bin.
 
 use std::error::Error;
 use std::fs;

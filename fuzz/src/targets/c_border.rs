@@ -96,7 +96,7 @@ fn detect(input: &mut Numbers<'_>) -> bool {
     };
     let [idx, room, max_points] = [input.u8(), input.u8(), input.u8()].map(usize::from);
     let pixels = vec![input.u8(); MAX_PIXEL_BYTES];
-    // The contract: `num_bytes` may be read.
+    // By the contract, `num_bytes` bytes must be readable.
     picture.num_bytes = picture.num_bytes.min(pixels.len());
     picture.pixels = if idx == 255 { null() } else { pixels.as_ptr() };
     let mut found = 0;

@@ -11,7 +11,7 @@ use crate::target::Target;
 
 /// The version that the server speaks.
 const VERSION: Version = Version::V5;
-/// Maximum number of cycles of one session: a motion whose client is gone ends well before.
+/// Maximum number of cycles of one session. A motion whose client has disconnected ends after far fewer cycles.
 const MAX_CYCLES: u32 = 400;
 /// Start position of the joints, in rad: Franka's ready pose.
 const READY: [f64; 7] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];

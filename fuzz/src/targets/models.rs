@@ -15,7 +15,7 @@ fn safetensors() -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes(), header.as_slice(), &[1; 16]].concat()
 }
 
-/// Prefix of inputs that are the pickle of torch's zip; the zip is built around it with correct checksums.
+/// Prefix of inputs that are the pickle of torch's zip; the zip is built around the pickle with correct checksums.
 const IN_ZIP: &[u8] = b"in a zip:";
 /// End of the pickle's name in the zip.
 const PICKLE: &str = "data.pkl";

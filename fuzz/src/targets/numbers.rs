@@ -1,6 +1,6 @@
 //! Reads successive numbers from an input.
 
-/// The rest of an input; zeros follow its end.
+/// The rest of an input; beyond its end, zeros are read.
 pub(super) struct Numbers<'a>(pub(super) &'a [u8]);
 
 impl Numbers<'_> {

@@ -1,4 +1,4 @@
-//! The annotation page's server: HTTP, its guard and its routes, over TCP.
+//! The annotation page's server: HTTP, the checks of host, origin and token, and the routes, over TCP.
 
 use std::net::{Ipv4Addr, TcpStream};
 use std::ops::ControlFlow;

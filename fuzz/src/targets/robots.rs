@@ -72,7 +72,8 @@ pub(super) fn message(bytes: &[u8], kind: HeaderKind) -> Option<(Header, Vec<u8>
     let size = announced.map_or(kind.size(), |header| header.size as usize);
     assert!(
         stream.largest_buffer <= size.min(MAX_STEP),
-        "expected a buffer of at most {size} bytes, found {}",
+        "expected a buffer of at most {} bytes, found {}",
+        size.min(MAX_STEP),
         stream.largest_buffer
     );
     if let Ok(Ok((_, payload))) = &message {

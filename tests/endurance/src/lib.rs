@@ -6,7 +6,7 @@
 //!   back.
 //! - [`soak`]: long runs of live detection, of the page, and of a camera that disconnects.
 //!
-//! It runs the program `sdg` from outside, as a user does, and uses of its crates only `calibration` and `geometry`, to
+//! It runs the program `sdg` from outside, as a user does, and uses only its crates `calibration` and `geometry`, to
 //! render the board.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 

@@ -4,8 +4,8 @@
     python tests/golden/opencv/calibrate.py FOLDER > tests/golden/opencv/calibration.json
 
 Needs opencv-contrib-python-headless 4.11. The lens has k1, k2, p1, p2, as ours without --k3. The corners are found by
-findChessboardCornersSB, or by findChessboardCorners with cornerSubPix (five windows); the corners with the
-lowest reprojection error are used.
+findChessboardCornersSB, or by findChessboardCorners with cornerSubPix (five window sizes); the corners with the lowest
+reprojection error are used.
 """
 
 import json

@@ -202,7 +202,7 @@ def count_detections(model):
 
 
 def randomize_until_found(model, seed, residual_gain=1.0):
-    """Repeats `randomize` until there are four detections: not every random network has any."""
+    """Repeats `randomize` until there are at least four detections, because some random networks have none."""
     while randomize(model, seed, residual_gain) or count_detections(model) < 4:
         seed += 10
 

@@ -112,7 +112,7 @@ impl Machine<'_> {
         WeightsError::damaged(format!("pickle, byte {}", self.at), expected, found)
     }
 
-    /// Counts operations, and copies as if they were operations.
+    /// Counts operations; each copied item counts as an operation.
     fn charge(&mut self, count: usize) -> Result<()> {
         let total = u64::from(self.operations) + count as u64;
         if total > u64::from(MAX_OPERATIONS) {

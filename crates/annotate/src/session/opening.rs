@@ -141,7 +141,7 @@ impl Session {
     }
 
     /// If the session has no project, it gets the project of its first photo; pictures that were added on the page
-    /// before are copied into its folder.
+    /// earlier are copied into the folder of this project.
     pub(super) fn settle_place(&self, state: &mut State, id: usize) -> Result<()> {
         let Some(temporary) = self.temporary.as_ref().filter(|_| state.place.is_none()) else { return Ok(()) };
         state.place = Some(ProjectPlace::of_photo(&state.images[id].picture.path)?);

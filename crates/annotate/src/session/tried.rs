@@ -144,12 +144,12 @@ impl Session {
         compared.collect()
     }
 
-    /// Teaches a model without a network with a tried picture added, and returns the model's best score in each of the
-    /// given other tried pictures. Nothing is kept. `None` while a teaching is running, because the model of that
-    /// teaching may answer the question.
+    /// Teaches model S from the demonstrations and, in addition, a tried picture. Returns the model's best score in
+    /// each of the given other tried pictures. Nothing is kept. `None` while a teaching is running, because the model
+    /// of that teaching may answer the question.
     ///
     /// # Errors
-    /// A model with a network; an unknown picture; insufficient marks.
+    /// Another model than S; an unknown picture; insufficient marks.
     pub(crate) fn would_help(&self, trial_id: usize, question: HelpQuestion) -> Result<Option<Vec<(usize, f64)>>> {
         let HelpQuestion { teaching, marks, others } = question;
         teaching.check()?;

@@ -6,9 +6,9 @@ use crate::error::CalibrationError;
 
 /// Number of squares of the dot pattern along each side, more than any board has.
 pub(crate) const PATTERN_SIDE: u32 = 32;
-/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. Random, from the first of 100 seeds with these
-/// properties on 9 × 6 squares (tested below): any two windows of 3 × 3 squares differ at every rotation, and any two
-/// of 4 × 4 differ in at least four squares.
+/// The dots: one bit for each square, `1 << column` of `PATTERN[row]`. The dots are pseudo-random. The seed is the
+/// first one, of 100 tried, with these properties on 9 × 6 squares (tested below): any two windows of 3 × 3 squares
+/// differ at every rotation, and any two of 4 × 4 differ in at least four squares.
 const PATTERN: [u32; PATTERN_SIDE as usize] = pattern(13);
 
 const fn pattern(seed: u64) -> [u32; PATTERN_SIDE as usize] {
@@ -36,7 +36,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Minimum and maximum number of squares along a side: four squares have three corners between them.
+    /// Minimum and maximum number of squares along a side. With the minimum, three corners lie between the squares.
     pub const SIDES: [u32; 2] = [4, 30];
     /// Radius of a dot, in sides of a square. A dot stays outside circles with a radius of 0.45 sides around the
     /// corners.
@@ -117,7 +117,7 @@ impl Board {
         column < PATTERN_SIDE && row < PATTERN_SIDE && PATTERN[row as usize] >> column & 1 == 1
     }
 
-    /// Whether ink is printed at a point of the board's frame, in sides of a square.
+    /// Whether ink is printed at a point of the board's frame. The point's coordinates are in sides of a square.
     pub fn is_inked(&self, place: &Point2<f64>) -> bool {
         let inside = |value: f64, side: u32| (0.0..f64::from(side)).contains(&value);
         if !(inside(place.x, self.columns) && inside(place.y, self.rows)) {

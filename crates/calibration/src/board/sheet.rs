@@ -242,7 +242,7 @@ fn room_mm(paper: Paper) -> [f64; 2] {
 
 fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
     let (columns, rows, square_m) = (board.columns(), board.rows(), board.square_m());
-    // The space between the line and the board must leave the outer squares' corners clear.
+    // The line is 12 mm below the board, so that a white margin remains around the outer squares.
     let line = bottom - 12.0;
     let mut text = |x: f64, y: f64, size: f64, text: String| shapes.push(Shape::Text { x, y, size, text });
     text(left, bottom - 6.0, 3.5, "Origin: the corner above. x to the right, y upwards.".to_owned());

@@ -12,7 +12,7 @@ use crate::error::CalibrationError;
 /// A grid's placement on the board: the board's corner `[i, j]` for each position of the grid.
 pub(super) type Placed = BTreeMap<Place, [u32; 2]>;
 
-/// The dot of the square between `[i, j]` and `[i + 1, j + 1]`: 0 for absent, 1 for present.
+/// The dot of the square between `[i, j]` and `[i + 1, j + 1]`: from 0 (absent) to 1 (present).
 type Dots = BTreeMap<Place, f64>;
 
 /// Largest fraction of the squares that may contradict the board, because of shadows or glare.
@@ -22,8 +22,8 @@ const MAX_CONTRADICTION: f64 = 0.2;
 const MIN_MARGIN: f64 = 1.5;
 /// Number of found corners that may lie outside the board.
 const MAX_OUTSIDE: usize = 2;
-/// Largest number of dots that may be detected on a board without dots, as a fraction of the dots of a board with them,
-/// on which half of the squares have one.
+/// Largest number of dots that may be detected on a board without dots, as a fraction of the dots of an equally large
+/// board with dots. On such a board, half of the squares have a dot.
 const MAX_PLAIN: f64 = 0.3;
 /// Distance from a square's centre of the points at which the square's own colour is sampled, in sides: outside a dot
 /// and inside the edges.

@@ -21,7 +21,7 @@ const NEIGHBOURS: [(Place, usize, f64); 4] =
 const MAX_OFF: f64 = 0.3;
 /// Largest deviation of the first neighbours from the edges' directions: the sine of 14 degrees.
 const MAX_SINE: f64 = 0.25;
-/// Minimum strength of a neighbour relative to a corner's. Light decreases along a board, but not abruptly.
+/// Minimum ratio of the strengths of neighbouring corners. Light decreases along a board, but not abruptly.
 const MIN_STRENGTH: f64 = 0.05;
 /// Maximum number of saddle points from which grids are grown: the strongest that are not yet in a grid.
 const MAX_SEEDS: usize = 60;

@@ -16,8 +16,8 @@ use super::seen_corner::SeenCorner;
 
 /// Radius of the window, in sides of a square: the window contains neither the next edge nor a dot.
 const WINDOW: f64 = 0.38;
-/// Minimum and maximum radius of the window, in pixels: smaller windows have too few gradients, larger ones include the
-/// lens's curvature.
+/// Minimum and maximum radius of the window, in pixels: smaller windows have too few gradients, and in larger ones the
+/// lens's distortion bends the edges.
 const WINDOWS_PX: [f64; 2] = [2.5, 24.0];
 /// Standard deviation of the weight, in radii of the window.
 const SIGMA: f64 = 0.5;

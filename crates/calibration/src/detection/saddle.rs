@@ -20,7 +20,7 @@ pub(super) struct Saddle {
 /// Standard deviation of the smoothing before derivatives, in pixels: it removes noise, and corners of squares of six
 /// pixels stay separate.
 const SIGMA: f64 = 1.5;
-/// Minimum contrast between dark and light squares, in grey levels: a tenth of a board's contrast in the dark.
+/// Minimum contrast between dark and light squares, in grey levels: a tenth of a board's contrast in dim light.
 const MIN_CONTRAST: f64 = 10.0;
 /// Largest ratio of the two curvatures; noisy edges have larger ratios. The ratio is 3 for squares seen at 70 degrees.
 const MAX_CURVATURE_RATIO: f64 = 8.0;
@@ -28,8 +28,9 @@ const MAX_CURVATURE_RATIO: f64 = 8.0;
 /// squares of six pixels.
 const RING_PX: f64 = 4.0;
 const RING_PLACES: usize = 24;
-/// Maximum of the squared differences of opposite points on the ring, relative to the squared variation that they have
-/// in common. 0 where four squares meet, and 2 at the corner of a dark square on white, which is also a saddle point.
+/// Maximum sum of the squared differences of opposite points on the ring, relative to the squared variation that they
+/// have in common. The ratio is 0 where four squares meet, and 2 at the corner of a dark square on white, which is also
+/// a saddle point.
 const MAX_ASYMMETRY: f64 = 0.5;
 /// Radius, in pixels, within which a saddle point must be the strongest.
 const RADIUS: usize = 2;
@@ -79,7 +80,8 @@ pub(super) fn find(picture: &Luminance) -> Vec<Saddle> {
 impl Saddle {
     /// The directions of both edges.
     pub(super) fn edges(&self) -> [Vector2<f64>; 2] {
-        // Along the eigenvectors e and f the form is a s² + b t² with a b < 0: it is zero at t = ± s √(-a / b).
+        // At the point s e + t f, where e and f are the eigenvectors, the quadratic form is a s² + b t² with a b < 0.
+        // It is zero at t = ± s √(-a / b).
         let eigen = self.hessian.symmetric_eigen();
         let slope = (-eigen.eigenvalues[0] / eigen.eigenvalues[1]).max(0.0).sqrt();
         let (e, f) = (eigen.eigenvectors.column(0).into_owned(), eigen.eigenvectors.column(1).into_owned());
@@ -88,8 +90,8 @@ impl Saddle {
 
     /// Whether dark and light squares are exchanged between two corners, as for neighbours along an edge.
     pub(super) fn is_opposite(&self, other: &Self) -> bool {
-        // The trace of the product of the traceless parts of both forms: 1 for equal forms, -1 for forms rotated by 90
-        // degrees.
+        // The inner product of the normalised traceless parts of both Hessians: 1 for equal Hessians, -1 for Hessians
+        // rotated by 90 degrees.
         let traceless = |m: &Matrix2<f64>| (m - Matrix2::identity() * (0.5 * m.trace())).normalize();
         traceless(&self.hessian).dot(&traceless(&other.hessian)) < 0.0
     }

@@ -1,4 +1,5 @@
-//! Reprojection over all pictures, as a function of `X`, `Y`, the board's scale and the error of each robot pose.
+//! Reprojection over all pictures, as a function of `X`, `Y` (see the parent module), the board's scale and the error
+//! of each robot pose.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 use sdg_geometry::{Mount, PinholeCamera};

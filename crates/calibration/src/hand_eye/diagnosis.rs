@@ -25,11 +25,11 @@ const MAX_SHARE_OF_FEW: f64 = 0.5;
 /// of 700 px. A robot with errors of 0.5 mm and 0.25 degrees causes as much.
 const MAX_RESIDUAL_RAD: f64 = 0.007;
 /// Largest residual of the closed form for which the minimum is searched; the search takes long if there is no minimum.
-/// Robot errors of [`MAX_RESIDUAL_RAD`] cause a fifth of this residual between two pictures.
+/// The robot errors that cause [`MAX_RESIDUAL_RAD`] cause a fifth of this residual between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
 /// Ratio of two explanations' residuals up to which they count as equal.
 const ALIKE: f64 = 1.2;
-/// Difference that is not measurable in corners, in pixels.
+/// Difference of two residuals, in pixels, that is smaller than the error of corners.
 const ALIKE_PX: f64 = 0.02;
 /// Minimum relative error of the board's size; a smaller one is the reading error of a ruler on a line of 100 mm.
 const MIN_SCALE_ERROR: f64 = 0.003;
@@ -41,8 +41,8 @@ const FEW_EQUATIONS: f64 = 30.0;
 /// Largest fraction of the robot's errors that may remain with another size of the board: the wrong size then causes a
 /// quarter of the squared error.
 const MAX_ROBOT_SHARE: f64 = 0.85;
-/// Largest difference between the rotations of robot and board between two pictures, in radians: 3 degrees, twice
-/// [`MAX_ROBOT_SCALE`].
+/// Largest difference between the rotations of robot and board between two pictures, in radians: 3 degrees, twice the
+/// rotation error at [`MAX_ROBOT_SCALE`].
 const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
 /// An explanation and its residual.
@@ -107,8 +107,8 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
     }
 }
 
-/// Other readings of all poses, and exclusions or exchanges of a few. Each has a residual that errors of the corners
-/// and a robot can explain.
+/// Other readings of all poses, and exclusions or exchanges of a few poses. Each explanation has a residual that errors
+/// of the corners and a robot can explain.
 fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<Explanation> {
     let readings = readings::plausible(evidence.mount, robot, &evidence.boards());
     let readings = readings.into_iter().filter_map(|reading| {
@@ -180,7 +180,7 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
 
 /// The first explanation whose residual counts as the smallest. The explanations are sorted, the simplest first.
 fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
-    // Without both exchanged pictures the others also agree.
+    // The other poses also agree if both exchanged ones are left out, so this second explanation is dropped.
     let exchanged = explanations.iter().find_map(|explanation| match explanation.kind {
         Kind::MixedUp(MixedUp::Exchanged(two)) => Some(MixedUp::Wrong(two.to_vec())),
         _ => None,

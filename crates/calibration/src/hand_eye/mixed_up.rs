@@ -27,7 +27,7 @@ const MIN_FOR_TWO: usize = MIN_POSES + 4;
 /// With more pictures, not every pair is tried, only the pairs that include the worst picture.
 const MAX_ALL_PAIRS: usize = 30;
 
-/// The most plausible choice of each kind, the simplest kind first.
+/// The most plausible choice of each kind, if it is clear; the simplest kind first.
 pub(super) fn plausible(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Vec<MixedUp> {
     let (motions, boards) = (evidence.motions(robot), evidence.boards());
     let left = |motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]| {

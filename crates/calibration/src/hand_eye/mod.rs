@@ -14,8 +14,8 @@
 //! poses that contradict the pictures ─ another reading of all, a few wrong ones, the board's size     diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
 //! A robot's pose has an error far above that of the corners: 0.05 degrees at 0.5 m are 0.4 mm, about half a pixel at a
-//! focal length of 600 px. If the reprojection error shows this, each robot pose gets six corrections, whose squares
-//! are weighted relative to the squared pixels.
+//! focal length of 600 px. If the reprojection error is larger than the errors of the corners explain, each robot pose
+//! gets six corrections, whose squares are weighted relative to the squared pixels.
 
 mod bundle;
 mod closed_form;

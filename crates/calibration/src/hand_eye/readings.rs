@@ -1,4 +1,4 @@
-//! Readings of the robot poses: other conventions in which they are frequently written by mistake.
+//! Readings of the robot poses: other conventions, in which poses are often written by mistake.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use sdg_geometry::Mount;

@@ -1,4 +1,4 @@
-//! Minimises the reprojection error over all pictures; also estimates the robot's errors if this error is too large.
+//! Minimises the reprojection error over all pictures; also estimates the robot's errors if the minimum is too large.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{Mount, PinholeCamera};
@@ -140,7 +140,7 @@ impl<'a> Solved<'a> {
     }
 
     /// The decrease of the squared error when the board's scale becomes free while the weights of the robot's errors
-    /// are kept. By chance alone, 1 is expected.
+    /// are kept; in units of the variance. By chance alone, 1 is expected.
     pub(super) fn gain_of_free_scale(&self) -> f64 {
         let at = &self.minimum.at;
         let free = minimise(at.with_free_scale(at.board_scale));

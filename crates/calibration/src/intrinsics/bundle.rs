@@ -78,7 +78,8 @@ impl Bundle<'_> {
         (sum / self.num_corners() as f64).sqrt()
     }
 
-    /// Excludes corners farther away than `ratio` times the RMS, except from pictures with few corners.
+    /// Excludes corners farther from their projections than `ratio` times the RMS, except from pictures that would keep
+    /// too few corners.
     pub(super) fn without_outliers(mut self, ratio: f64) -> Self {
         let bound = (ratio * self.rms_px()).powi(2);
         let kept = (0..self.views.len()).map(|view| {

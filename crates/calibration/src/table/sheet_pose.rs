@@ -25,8 +25,8 @@ pub struct SheetPose {
     pub tilt_rad: f64,
 }
 
-/// Largest angle from the vertical, in degrees. Beyond this angle, the horizon is near, and a millimetre of the table
-/// is at most a fifth of a pixel.
+/// Largest angle from the vertical, in degrees. Beyond this angle, the horizon is near, and lengths on the table along
+/// the line of sight appear shortened to about a quarter or less.
 const MAX_TILT_DEG: f64 = 75.0;
 
 /// Finds the camera's pose above the sheet.

@@ -62,9 +62,8 @@ pub fn turn(axis: [f64; 3], half_tangent: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(1.0, x, y, z))
 }
 
-/// The board's pose: its centre is at `pixel` (of the pinhole without lens), at `distance_m` along the axis; it is
-/// rotated in the picture by `roll`, then tilted about the picture's x and y. All angles are given as tangents of half
-/// angles.
+/// The board's pose: its centre is at `pixel` (without lens distortion), at `distance_m` along the axis; it is rotated
+/// in the picture by `roll`, then tilted about the picture's x and y. All angles are given as tangents of half angles.
 pub fn camera_from_board(
     board: &Board,
     camera: &PinholeCamera,

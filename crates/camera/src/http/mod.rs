@@ -5,8 +5,8 @@
 //! Url ── exchange: connect, request, head, redirects ── Body: framing ─┬─ Multipart ── MotionJpeg   (one connection)
 //!                                                                      └─ one picture ── Snapshots  (a connection each)
 //! ```
-//! A minimal HTTP client, sufficient for cameras; the data that a server can send is bounded in memory and in time. Not
-//! supported: TLS, compression, cookies, proxies, keep-alive between snapshots.
+//! A minimal HTTP client, sufficient for cameras; the memory and the time that a server's data can take are bounded.
+//! Not supported: TLS, compression, cookies, proxies, keep-alive between snapshots.
 
 mod body;
 mod exchange;

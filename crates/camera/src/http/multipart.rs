@@ -5,8 +5,8 @@ use crate::decode::MAX_ENCODED_BYTES;
 
 /// Splits a body at its boundaries.
 ///
-/// All variants that cameras use are accepted: the boundary is announced with or without its leading dashes, lines end
-/// with CRLF or LF, and a part states its length or ends at the next boundary.
+/// The variants of different cameras are accepted: the boundary is announced with or without its leading dashes, lines
+/// end with CRLF or LF, and a part states its length or ends at the next boundary.
 #[derive(Debug)]
 pub(super) struct Multipart {
     /// `--` and the boundary.

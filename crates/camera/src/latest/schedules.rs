@@ -1,5 +1,5 @@
-//! All orders of up to seven steps of a camera's thread and of a caller of [`LatestFrame`], compared with a
-//! model without threads. Steps do not overlap, because every operation on the cell holds one lock.
+//! All orders of up to seven steps of a camera's thread and of a caller of [`LatestFrame`], compared with a model
+//! without threads. Steps do not overlap, because every operation on [`LatestFrame`] holds one lock.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::channel;
@@ -23,7 +23,7 @@ enum Turn {
 
 const TURNS: [Turn; 3] = [Turn::Frame, Turn::Torn, Turn::Take];
 
-/// The specification of the cell, without threads.
+/// The specification of [`LatestFrame`], without threads.
 #[derive(Default)]
 struct Model {
     newest: Option<u64>,
@@ -69,7 +69,7 @@ fn check(schedule: &[Turn]) {
                 continue;
             }
         }
-        // The camera is asked again after the cell has stored the last frame.
+        // The camera is asked again after its last frame or error was stored.
         was_asked.recv().unwrap();
     }
     assert!(!latest.has_ended(), "{schedule:?}");

@@ -10,8 +10,8 @@ pub(super) struct Choice {
     pub(super) size: (u32, u32),
 }
 
-/// Chooses the best of a node's formats by these criteria, in this order: the wanted size, a sufficient frame rate, the
-/// smallest loss of the encoding. `None` if no format is supported.
+/// Chooses the best of a node's formats by these criteria, in this order: the size nearest to the wanted one, a
+/// sufficient frame rate, the smallest loss of the encoding. `None` if no format is supported.
 pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice> {
     let wanted = (options.width, options.height);
     let rated = formats.iter().filter_map(|format| {

@@ -38,7 +38,7 @@ pub struct Format {
 /// The sizes of a format, in pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sizes {
-    /// A list of width and height.
+    /// A list of widths and heights.
     Listed(Vec<(u32, u32)>),
     /// All sizes in a range, which the driver may round.
     Range {

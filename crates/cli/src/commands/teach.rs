@@ -142,7 +142,7 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
 /// Teaches with progress on standard error, writes the model file, and tests the model on held-out samples.
 ///
 /// # Errors
-/// Errors of teaching as [`GraspError`]; the file cannot be written.
+/// Errors of teaching as [`GraspError`]; the file cannot be written; the test fails.
 pub(super) fn teach_to_file(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
@@ -268,7 +268,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     Ok(if failure.is_some() { Outcome::ModelFails } else { Outcome::Done })
 }
 
-/// Adds the option's name if its region is the cause of the error.
+/// Adds `--region` to an error that the region caused.
 fn of_region(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
         Some(GraspError::Region(_)) => error.context("--region"),
@@ -314,7 +314,7 @@ pub(super) fn command(args: &TeachArgs) -> String {
 }
 
 /// Adds the initial weights to the options. Weights that do not fit are rejected before the teaching, which takes
-/// minutes; the whole report is part of the JSON at the end.
+/// minutes. Returns the report about the weights, for the JSON at the end.
 pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
     if path.as_os_str() == NO_BASE_WEIGHTS {

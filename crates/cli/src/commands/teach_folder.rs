@@ -16,8 +16,8 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
 
-/// Teaches the parts that have no model from these inputs yet. Then, unless `--part` selects single parts, runs each
-/// model on every photo.
+/// Teaches the parts whose outcome for these inputs is not stored yet. Then, unless `--part` selects single parts, runs
+/// each model on every photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
     read_base_weights(args, &mut options)?;

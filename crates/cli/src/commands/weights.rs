@@ -117,7 +117,7 @@ fn in_options(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// Prints the whole report first, even if tensors are missing, and then writes the file unless there is an error.
+/// Prints the whole report, even if tensors are missing, and writes the file unless there is an error.
 fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
@@ -165,7 +165,7 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
 fn inspect(args: &InspectArgs) -> Result<Outcome> {
     let (source, checkpoint) = open(&args.file)?;
     let sha256 = sha256_of(&args.file).with_context(|| args.file.display().to_string())?;
-    // Unknown names of tensors are shown as well.
+    // A checkpoint whose naming is unknown is shown as well.
     let naming = naming_of(&checkpoint).ok();
     let types: Vec<_> = checkpoint.element_types().iter().map(|(e, count)| format!("{count} {}", e.name())).collect();
     let mut stdout = std::io::stdout().lock();

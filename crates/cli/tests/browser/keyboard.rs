@@ -28,7 +28,7 @@ fn all_marks_are_made_and_corrected_by_keys() {
     let corner = page.saved().bbox;
     assert_eq!([corner.x2 - start.x2, corner.y2 - start.y2, corner.x1 - start.x1], [-1.0, 10.0, 0.0]);
 
-    // It does not matter whether an outline is found in such a box.
+    // The page may have found an outline in this box; the outline is removed.
     if page.saved().outline.is_some() {
         page.click("[data-clear=outline]");
     }

@@ -19,7 +19,7 @@ fn picture() -> RgbImage {
 /// Replaces the picture of the `dir:` camera.
 fn show(table: &Path, name: &str, picture: &RgbImage) {
     let before: Vec<_> = std::fs::read_dir(table).unwrap().map(|entry| entry.unwrap().path()).collect();
-    // The file is hidden while it is written, as other programs do.
+    // The file has a hidden name until it is complete; other programs write pictures in the same way.
     let hidden = table.join(format!(".{name}"));
     picture.save(&hidden).unwrap();
     std::fs::rename(hidden, table.join(name)).unwrap();

@@ -182,7 +182,8 @@ pub fn assert_accessible(browser: &Browser, about: &str) {
 }
 
 fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
-    // A file above the test's size limit is then an error, as on a full disk, instead of ending the program.
+    // With the signal XFSZ ignored, a file above the test's size limit is an error, as on a full disk, and does not end
+    // the program.
     let mut server = Command::new("sh")
         .args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_sdg")])
         .args(["annotate", "--no-browser", "--json"])

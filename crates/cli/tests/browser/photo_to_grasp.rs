@@ -237,7 +237,7 @@ fn try_on_another_picture(page: &Page) {
     patiently(page, "a grasp", "return document.querySelector('.found') !== null");
     assert!(page.text(".found").contains("Found the part"), "{}", page.text("#found"));
     page.screenshot("8-found");
-    // The part was turned by half a turn, and so is the shown direction.
+    // The part was turned by half a turn, and the shown direction is turned as well.
     let turned = before.angle().degrees() + 180.0;
     let is_turned = |shown: &f64| ((shown - turned + 180.0).rem_euclid(360.0) - 180.0).abs() < 3.0;
     assert!(dots_deg(page).iter().any(is_turned), "{:?}, expected {turned}°", dots_deg(page));

@@ -59,7 +59,7 @@ fn photo() -> RgbImage {
     image::open(shipped_photo()).unwrap().into_rgb8()
 }
 
-/// The part, half covered.
+/// The photo with half of the part covered.
 fn half_covered() -> RgbImage {
     let mut picture = photo();
     for y in 150..300 {
@@ -386,7 +386,7 @@ fn on_a_full_disk_a_banner_stays_and_saving_is_tried_again() {
     page.wait_for("the banner", "return !document.getElementById('unsaved').hidden");
     let banner = page.text("#unsaved");
     assert!(banner.starts_with("Not saved: the marks on photo.png (") && banner.contains("too large"), "{banner}");
-    // The message stays, also elsewhere on the page and later.
+    // The message stays in another step of the page, and after 3.5 seconds.
     page.click("#tab-try");
     page.settle_frames();
     page.wait_for("another try", "return new Promise((done) => setTimeout(() => done(true), 3500))");
@@ -479,7 +479,7 @@ fn at_360_px_nothing_lies_on_the_part_or_the_tools() {
             Math.max(part.width, part.height)]";
     let told = page.browser.run(overlap, &[]).unwrap();
     assert_eq!((&told[0], &told[1]), (&json!(false), &json!(false)));
-    // Zoomed in after the box is drawn, so that the part is large compared with its handles.
+    // The page zooms in after the box is drawn, so that the part is large compared with its handles.
     assert!(told[2].as_f64().unwrap() > 120.0, "{told}");
     page.screenshot("project-7-360");
     page.assert_quiet();

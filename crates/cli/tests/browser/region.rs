@@ -70,7 +70,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.unfold("#region-fold");
     assert!(page.text("#region-text").contains("The whole picture is searched"));
 
-    // Drawn on the live picture, beside the part.
+    // The region is drawn on the live picture, beside the part.
     drag(&page, BESIDE_IT);
     live_found_is(&page, "There is nothing to grasp");
     assert!(page.text("#region-text").contains("are in the frame"), "{}", page.text("#region-text"));
@@ -78,7 +78,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     page.screenshot("region-1-live");
     page.assert_accessible("a region on the live picture");
 
-    // On a picture, given as numbers, around the part.
+    // On a picture, the region is given as numbers, around the part.
     let other = page.folder.path().join("other.png");
     std::fs::copy(shipped_photo(), &other).unwrap();
     page.browser.find("#picture-input").unwrap().type_text(other.to_str().unwrap()).unwrap();
@@ -109,7 +109,7 @@ fn a_region_is_drawn_and_typed_and_holds_live_and_in_the_next_model() {
     // The next model stores the region; after a reload it is shown again.
     teach(&page);
     assert_eq!(region_of_file(&page), Some(ON_IT.map(|side| side as u32)));
-    // The page reports the effect of the new model; the effect of another region is not reported as a model's.
+    // The page reports the effect of the new model. It does not report the effect of another region as that of a model.
     page.click("#tab-try");
     page.settle_frames();
     let learnt = "return document.getElementById('learnt').innerText.startsWith('The new model finds')";

@@ -111,7 +111,7 @@ fn jaws_that_would_touch_a_neighbour_are_told() {
     page.assert_quiet();
 }
 
-/// The part, its right third covered.
+/// The photo with the right third of the part covered.
 fn covered() -> RgbImage {
     let mut covered = photo();
     for y in 150..300 {

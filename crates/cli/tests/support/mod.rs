@@ -33,8 +33,8 @@ pub fn shipped(part: &str, name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations").join(part).join(name)
 }
 
-/// Writes model S of the shipped pendulum, taught with seed 1: with a camera, marks at 16 mm and grasp at 9 mm; or
-/// without a camera.
+/// Writes model S of the shipped pendulum, taught with seed 1. If a camera is given, the marks are 16 mm and the grasp
+/// is 9 mm above the table.
 ///
 /// Many tests need one of these models (one per camera file), each in its own process, and teaching takes seconds. The
 /// first test that needs a model therefore teaches it, for this program and these inputs, and other tests copy it.

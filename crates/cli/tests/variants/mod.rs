@@ -6,8 +6,8 @@
 //!        ├─ marks: format, order, ids, units, paths, names ─ convert to COCO ──┼─ the same grasp, or a refusal
 //!        └─ a sample of both ─────────────────────────────── teach, detect ────┘
 //! ```
-//! The seed and the number of a variant determine it, so that a failure can be reproduced: `SDG_VARIANTS_SEED=7 cargo
-//! nextest run …`.
+//! The seed and a variant's number determine the variant, so that a failure can be reproduced: `SDG_VARIANTS_SEED=7
+//! cargo nextest run …`.
 
 mod json_text;
 mod marks;

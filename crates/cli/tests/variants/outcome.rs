@@ -13,7 +13,7 @@ const SAME_DEG: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     Same,
-    /// One line that names file and field.
+    /// Refused with one line that names the file and the field.
     Refused,
     /// Any other outcome, in words.
     Other(String),

@@ -49,7 +49,7 @@ fn named(dice: &mut Pcg64Mcg, endings: &[&str], recipe: String, bytes: Vec<u8>) 
     Photo { recipe: format!("{name:?}, {recipe}"), name, bytes }
 }
 
-/// The picture without any loss.
+/// The picture in a file, stored without loss.
 pub fn lossless(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     match dice.random_range(0..10) {
         0..=3 => png(dice, photo),
@@ -177,7 +177,7 @@ fn bmp(dice: &mut Pcg64Mcg, photo: &RgbImage) -> Photo {
     let kind = *pick(dice, &["24 bits", "24 bits from the top", "32 bits", "32 bits, alpha 0"]);
     let mut bytes = match kind {
         "24 bits" => encoded(&photo.clone().into(), ImageFormat::Bmp),
-        // The height is then negative, and the rows are stored from the top.
+        // The rows are stored from the top; the height in the header is negative (below).
         "24 bits from the top" => encoded(&DynamicImage::from(photo.clone()).flipv(), ImageFormat::Bmp),
         "32 bits" => encoded(&with_alpha(photo, 255).into(), ImageFormat::Bmp),
         _ => encoded(&with_alpha(photo, 0).into(), ImageFormat::Bmp),

@@ -44,7 +44,7 @@ impl Scene {
         let pivot = Vector2::from(pivot);
         let placed = |point: [f64; 2]| {
             let point = rotation * Vector2::from(point) + pivot;
-            // Files contain few digits.
+            // Rounded, because files contain few digits.
             [point.x, point.y].map(|value| (value * 16.0).round() / 16.0)
         };
         let outline: Vec<[f64; 2]> = PART.map(placed).to_vec();

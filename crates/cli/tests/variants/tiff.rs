@@ -29,7 +29,8 @@ pub struct Tiff {
     pub palette: Option<Vec<u16>>,
     pub is_float: bool,
     pub orientation: Option<u8>,
-    /// Number of pages before this one, each of 8×6 pixels: thumbnails or independent pictures.
+    /// Number of thumbnails before this page, each of 8×6 pixels; `other_pages` is the number of independent pictures
+    /// of this size before the page.
     pub thumbnails: usize,
     pub other_pages: usize,
 }
@@ -78,7 +79,7 @@ impl Tiff {
         }
     }
 
-    /// Appends the page, writes its offset at `link_at`, and returns the position of its own link.
+    /// Appends the page, writes its offset at `link_at`, and returns the position of the page's link to the next page.
     fn append(&self, file: &mut Vec<u8>, link_at: usize, is_thumbnail: bool) -> usize {
         let mut offsets = Vec::new();
         let mut lengths = Vec::new();
@@ -152,7 +153,7 @@ impl Tiff {
     }
 }
 
-/// Valid data for each compression; no result is smaller.
+/// Encodes bytes in the format of a compression. No result is smaller than the bytes.
 fn compressed(bytes: &[u8], compression: Compression) -> Vec<u8> {
     match compression {
         Compression::None => bytes.to_vec(),

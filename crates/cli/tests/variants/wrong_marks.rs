@@ -12,7 +12,7 @@ use super::scene::Scene;
 
 type Words = &'static [&'static str];
 
-/// Name of a photo in the folder that the marks may refer to instead.
+/// Name of another photo in the folder, to which the marks of one kind of fault refer.
 pub(super) const OTHER_PHOTO: &str = "other photo.png";
 
 /// The scene in that photo.

@@ -8,8 +8,8 @@ const CURVE_STEPS: usize = 1024;
 /// Brightest value that a curve distinguishes.
 const CURVE_TOP: f32 = 2.0;
 
-/// Multiplies a lighting gradient over the canvas, sometimes with the edge of a large shadow, then maps every
-/// channel through a tone curve of gain, gamma, contrast and cast.
+/// Multiplies the canvas by a lighting gradient, sometimes with the edge of a large shadow, then maps every channel
+/// through a tone curve of gain, gamma, contrast and cast.
 pub(crate) fn relight(canvas: &mut Raster, rng: &mut SampleRng) {
     let (width, height) = (canvas.width as f32, canvas.height as f32);
     let slope = direction(rng);

@@ -23,7 +23,7 @@ pub(crate) struct Mutant {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
-    /// Only the part beyond `offset` along the axis.
+    /// Only the piece beyond `offset` along the axis.
     Piece { offset: f32 },
     /// Longer or shorter along the axis.
     Stretched { factor: f32 },

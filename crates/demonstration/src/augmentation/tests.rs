@@ -189,7 +189,7 @@ fn poses_keep_the_part_in_view_and_never_mirror_it() {
         assert!(part.region.vertices.iter().all(|vertex| pose.handedness(vertex) > 0.0), "mirrored");
         let object = SampleObject::new(&part, &pose, [320, 240], 0);
         let similarity = object.image_from_demonstration;
-        // Half size times a scale of 0.83 to 1.2; the tilt changes it by a few percent.
+        // Half size times a scale of 0.83 to 1.2; the tilt changes the product by a few percent.
         assert!((0.36..0.63).contains(&similarity.scale), "{}", similarity.scale);
         let center = similarity.apply(&part.center) - pose.apply(&part.center);
         assert!(center.norm() < 2.0, "similarity is {} px off the warp", center.norm());
@@ -217,7 +217,7 @@ fn a_part_that_fills_the_photo_still_gets_a_pose() {
 }
 
 #[test]
-fn covers_hide_at_most_what_they_may_and_say_so() {
+fn covers_hide_keypoints_of_some_samples() {
     let augmenter = augmenter(SceneStyle { occlusion_probability: 1.0, positive_share: 1.0, ..SceneStyle::default() });
     let hidden = (0..60)
         .map(|index| augmenter.sample(index))

@@ -12,8 +12,7 @@ const MIN_VARIANCE: f64 = 1.0;
 const MIN_SAMPLES: usize = 4;
 /// Squared Mahalanobis distance within which 99 % of a Gaussian's samples lie, in three dimensions.
 const EXPLAINED: f32 = 11.3;
-/// Minimum weight of a Gaussian (its fraction of the samples); colours in the shadow of a smaller one are not
-/// recognised.
+/// Minimum weight (fraction of the samples) of a Gaussian whose colour is recognised in shadow.
 const MIN_SHADED_WEIGHT: f32 = 0.05;
 /// Minimum fraction of the lightness that remains in a shadow.
 const DARKEST_SHADE: f32 = 0.5;
@@ -25,7 +24,7 @@ const DARKEST_SHADE_SAID: f32 = 0.3;
 const BRIGHTEST_SAID: f32 = 0.92;
 /// Largest change of a* and b* by other light in a marked shadow.
 const MAX_TINT: f32 = 14.0;
-/// Additional variance in a marked shadow relative to that in the light: its depth and tint vary.
+/// Variance in a marked shadow, in addition to that in the light, because the shadow's depth and tint vary.
 const SAID_VARIANCE: f32 = 0.8;
 /// Added to L*: a shadow scales L* + 16, a* and b* by the same factor.
 const BLACK: f32 = 16.0;

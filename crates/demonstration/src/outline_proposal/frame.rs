@@ -13,8 +13,8 @@ use super::stroke::{OutlineStroke, Stroke};
 const MARGIN_SHARE: f64 = 0.2;
 /// … and at least, in pixels of the photo.
 const MIN_MARGIN_PX: f64 = 12.0;
-/// Maximum evidence of a pixel's colour, which never decides alone: shadows, highlights and noise have the colours of
-/// the other side.
+/// Maximum evidence of a pixel's colour. It is limited because shadows, highlights and noise have the colours of the
+/// other side.
 const MAX_EVIDENCE: f32 = 10.0;
 
 /// The box and its surroundings, in their own pixels.
@@ -33,7 +33,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// `None` for a box of less than a few pixels.
+    /// `None` for a box of less than four pixels in width or height.
     pub fn cut_out(image: &RgbImage, bbox: &BoundingBox, max_pixels: f64) -> Option<Self> {
         const MIN_SIDE_PX: f64 = 4.0;
         if bbox.width() < MIN_SIDE_PX || bbox.height() < MIN_SIDE_PX {
@@ -126,7 +126,7 @@ impl Frame {
     }
 
     /// Alternately learns colours from a division into part and surroundings, and cuts by them; pinned pixels stay on
-    /// their side. `elsewhere` has colours of surroundings beyond the frame. `None` for too few colours.
+    /// their side. `elsewhere` has further colours of the surroundings. `None` for too few colours.
     pub fn cut(
         &self,
         mut in_part: Vec<bool>,

@@ -14,7 +14,7 @@ use super::pieces::pieces;
 const MIN_UNSHADED_SHARE: f64 = 0.02;
 /// Largest distance of a person's box from the part, as a fraction of the box's side, on each side.
 const MAX_GAP: f64 = 0.1;
-/// Cost of the largest distance beyond [`MAX_GAP`], per length of the box's side.
+/// Factor of the largest distance beyond [`MAX_GAP`] in the cost; the distance is a fraction of the box's side.
 const GAP_COST: f64 = 2.0;
 /// Bonus of the guess without shadows. Without it, a cut with a shadow could have the highest score, because a shadow's
 /// border is an edge, too, and reaches the box.

@@ -1,7 +1,7 @@
 //! The cut of minimum cost through a picture, as a convex problem.
 //!
-//! Minimises Σ weight · |∇share| + Σ evidence · share over shares in [0, 1]. Shares above one half of any minimiser are
-//! a cut of minimum cost among all cuts (Chan, Esedoglu, Nikolova 2006).
+//! Minimises Σ weight · |∇share| + Σ evidence · share over shares in [0, 1]. The pixels whose share in a minimiser is
+//! above one half form a cut of minimum cost among all cuts (Chan, Esedoglu, Nikolova 2006).
 //!
 //! # Source
 //! Chambolle and Pock, "A first-order primal-dual algorithm for convex problems with applications to imaging", 2011,
@@ -29,7 +29,7 @@ pub(crate) struct Edges {
 impl Edges {
     /// From the colours of a picture, row by row.
     pub fn new(colors: &[Lab], width: usize) -> Self {
-        // To the right and down, like the gradient of the fractions.
+        // To the right and down, like the gradient of the shares.
         let contrast = |at: usize| {
             let right =
                 if !(at + 1).is_multiple_of(width) { colors[at].distance_squared(&colors[at + 1]) } else { 0.0 };

@@ -18,7 +18,7 @@
 //! a person's box: the part's outline runs along edges, and reaches the box. The cut is not found by a maximum flow,
 //! but as a convex problem, in 60 passes over the picture: its boundaries have no preference for the pixels' axes.
 //!
-//! It uses no knowledge of parts, and no randomness. The same photo and box give the same outline.
+//! The method uses no knowledge of parts, and no randomness. The same photo and box give the same outline.
 
 mod color_mixture;
 mod frame;

@@ -33,8 +33,8 @@ const REACH: f32 = 5.0;
 const TABLE_REACH: f32 = 1.0;
 /// Minimum distance to the part's border that [`REACH`] multiplies, in pixels.
 const MIN_DISTANCE_PX: f32 = 2.0;
-/// Edge strengths at which a selected shadow ends. Each is tried, and the shadow is removed that leaves the part with
-/// the largest fraction of its border along edges.
+/// Edge strengths at which a selected shadow ends. Each is tried. The removed shadow is the one without which the
+/// largest fraction of the part's border runs along edges.
 const MAX_EDGES: [f32; 3] = [1.1, 0.9, 0.6];
 /// Minimum distance of a shadow stroke from the outline, in pixels: closer pixels mix part and table, which looks like
 /// shadow.
@@ -109,8 +109,8 @@ impl<'a> Correction<'a> {
         (RADIUS_SHARE * (self.frame.width as f64).hypot(self.frame.height() as f64)) as f32
     }
 
-    /// The shadow under a stroke, as pixels of the part; before it, the fraction of the remaining part's border that
-    /// runs along edges. `None` if there is no shadow under the stroke.
+    /// Returns the fraction of the remaining part's border that runs along edges, and the shadow under a stroke, as
+    /// pixels of the part. `None` if there is no shadow under the stroke.
     fn shadow(&self, stroke: &Stroke, max_edge: f32) -> Option<(f64, Vec<bool>)> {
         let Self { frame, in_part, pinned, .. } = self;
         let surroundings = self.surroundings.as_ref().filter(|_| !stroke.is_inside)?;

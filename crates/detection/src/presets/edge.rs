@@ -3,7 +3,7 @@
 use super::{IMAGENET_MEAN, IMAGENET_STD, ROI_WEIGHTS, RcnnKind, UNIT_WEIGHTS};
 use crate::config::*;
 
-/// The default with keypoints: [`edge_of`] a keypoint detector.
+/// The default with keypoints: [`edge_of`] for a keypoint detector.
 pub fn edge(num_keypoints: usize) -> RcnnConfig {
     edge_of(RcnnKind::Keypoint { num_keypoints })
 }

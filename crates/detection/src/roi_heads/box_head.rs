@@ -142,7 +142,7 @@ impl BoxPredictor {
         [cls, reg]
     }
 
-    /// Returns the detections of each image, best first, without keypoints.
+    /// Returns the detections of each image, best first, without keypoints and masks.
     pub async fn detect(&self, hidden: Tensor<2>, rois: &[Roi], image_sizes: &[ImageSize]) -> Vec<Vec<RoiDetection>> {
         let scores = activation::softmax(self.cls_score.forward(hidden.clone()), 1);
         let [scores, deltas] = read_both(scores, self.bbox_pred.forward(hidden)).await;

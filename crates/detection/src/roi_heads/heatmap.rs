@@ -1,7 +1,7 @@
 //! Conversion of keypoints to heatmaps over a box, and back.
 //!
 //! A heatmap is a square of `S×S` cells stretched over a box. The target of a keypoint is the one cell that contains
-//! it; in inference the position inside the box is computed from all cells.
+//! it; in inference the position inside the box is computed from the values of the cells.
 
 use sdg_geometry::Keypoint;
 

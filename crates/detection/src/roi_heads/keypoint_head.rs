@@ -53,7 +53,7 @@ impl KeypointHead {
         upsample_bilinear_2x(self.score_lowres.forward(self.hidden(features, rois)))
     }
 
-    /// Returns the maps `[R, C, P, P]` from which the heatmaps are computed; `C` are the channels of the last
+    /// Returns the maps `[R, C, P, P]` from which the heatmaps are computed; `C` is the number of channels of the last
     /// convolution.
     pub fn hidden(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);

@@ -14,8 +14,8 @@ pub struct BoxMask {
 }
 
 impl BoxMask {
-    /// The mask on an image of `width × height` pixels: the pixels with at least `threshold`; for
-    /// [`MaskPasting::WholePixels`], those above it.
+    /// The mask on an image of `width × height` pixels: the pixels with a probability of at least `threshold`; for
+    /// [`MaskPasting::WholePixels`], those with a probability above it.
     ///
     /// `bounds` is in pixels of that image.
     pub fn paste(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f64, pasting: MaskPasting) -> Mask {
@@ -69,9 +69,9 @@ impl BoxMask {
     /// The mask by [`MaskPasting::WholePixels`].
     ///
     /// # Source
-    /// torchvision's `paste_masks_in_image`: the mask is padded; its box is enlarged by the same factor, and its
-    /// corners are truncated to whole pixels, which all belong to it. The mask has the pixels above the threshold, as
-    /// in torchvision's examples.
+    /// torchvision's `paste_masks_in_image`: the mask is padded, and its box is enlarged by the same factor. The
+    /// corners of the box are truncated to whole pixels, and both corner pixels belong to the box. The mask has the
+    /// pixels above the threshold, as in torchvision's examples.
     fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
         let padded = self.padded();
         let enlarged = padded.size as f32 / self.size as f32;
@@ -123,8 +123,8 @@ impl BoxMask {
 
 /// Interpolates between four cells, upper left first: fraction `fx` towards the right, fraction `fy` downwards.
 ///
-/// Both reference implementations sum in this order; a cell is one probability, not a pixel of three bytes as in
-/// `sdg-shape`.
+/// The interpolation of `sdg-shape` is not used: it reads pixels of three bytes, and a cell is one probability. Both
+/// reference implementations sum in the order of this function.
 fn blend([a, b, c, d]: [f32; 4], fx: f32, fy: f32) -> f32 {
     (a * (1.0 - fx) + b * fx) * (1.0 - fy) + (c * (1.0 - fx) + d * fx) * fy
 }

@@ -187,7 +187,8 @@ mod tests {
         let bitmap = ObjectMask::Bitmap(Mask::from_fn(8, 8, |x, _| x < 2));
         let roi = [0.0, 0.0, 8.0, 8.0];
         let legacy = encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Pooled);
-        // Legacy samples are at corners: 0.5, 1.5, 2.5, 3.5 read 1, 0.5, 0, 0.
+        // Without the shift by half a pixel, the samples lie between pixel centres: those at 0.5, 1.5, 2.5, 3.5 read 1,
+        // 0.5, 0, 0.
         assert_eq!(legacy, [0.375, 0.0, 0.375, 0.0]);
         assert_eq!(encode(&bitmap, &roi, [8, 8], 2, MaskTargets::Rasterized), [1.0, 0.0, 1.0, 0.0]);
         let polygon = ObjectMask::Polygons(vec![square(0.0, 0.0, 2.0, 8.0)]);

@@ -176,8 +176,8 @@ impl RoiHeads {
     }
 }
 
-/// Samples proposals on objects for a head in training: those that are `fit` for it (a function of the ROI and of the
-/// object's index in its image), at most `max` per image.
+/// Samples proposals on objects for a head in training, at most `max` per image. `fit` decides, from the ROI and the
+/// object's index in its image, whether a proposal is suitable.
 fn choose_objects(
     rois: &[SampledRoi],
     max: Option<usize>,

@@ -22,8 +22,8 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::error::EvaluationError;
 
-/// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration for both to
-/// be the same instance, in lengths of the line.
+/// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration, in lengths
+/// of the line. Within this distance, both are the same instance.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
 /// The pictures for testing a model.
@@ -45,7 +45,8 @@ impl LabelledFolder {
     /// # Errors
     /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the
     /// picture or for another picture size; two files label the same picture; an instance that is not optional has no
-    /// grasp; there are several labels, none of which is selected; the model was taught from all pictures.
+    /// grasp; no instance has the given label; without a given label, there are several labels, and none is the model's
+    /// object; the model was taught from all pictures.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let mut others = 0;
@@ -224,7 +225,7 @@ impl ReadPicture {
     }
 }
 
-/// Makes the instances optional that the model was taught from, because they are no test.
+/// Makes an instance optional if the model was taught from it, because finding it again tests nothing.
 fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
     for instance in instances {
         instance.optional |= instance.grasp.is_some_and(|grasp| {
@@ -238,7 +239,8 @@ fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
     label.is_none_or(|label| instance.annotation.label == label)
 }
 
-/// The label that counts; `None` if all instances have the same label, which need not be the model's object.
+/// The label that counts. `None` if no label is given and all instances have the same label, even if it is not the
+/// model's object.
 fn chosen_label(
     folder: &Path,
     pictures: &[ReadPicture],

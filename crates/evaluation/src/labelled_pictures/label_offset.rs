@@ -71,7 +71,8 @@ impl Beside {
     }
 }
 
-/// The offset between labels and detections, if most detections that hit no instance agree on one.
+/// The offset between labels and detections, if most detections agree on one. Only detections count that hit no
+/// instance but are near a label that was not found.
 pub fn label_offset(tested: &[Tested], min_score: f64) -> Option<LabelOffset> {
     let beside: Vec<Beside> = tested.iter().flat_map(|tested| beside_labels(tested, min_score)).collect();
     let agreeing = |seed: &Beside| {

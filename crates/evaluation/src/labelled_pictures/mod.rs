@@ -10,7 +10,8 @@
 //! A **part** is an instance that must be found. An **optional** instance (mostly covered, or seen from another side)
 //! counts neither as missed nor, if hit, as wrong. A **hit** is a detection within 4 % of the instance's diagonal and
 //! 10° of its marks, or, if it has no marks, with an IoU of at least 0.5; an instance has at most one hit. Instances
-//! that the model was taught from are optional, and a picture with only such instances is left out.
+//! that the model was taught from are optional. A picture with such an instance is left out if all its instances are
+//! optional.
 
 mod folder;
 mod label_offset;

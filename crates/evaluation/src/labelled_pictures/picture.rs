@@ -19,7 +19,7 @@ pub struct Instance {
     pub extent: Option<Extent>,
 }
 
-/// The scale by which hits are measured.
+/// The size and symmetry of an instance, by which hits are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// The diagonal of the demonstration's box, scaled to the instance's size.

@@ -21,7 +21,7 @@ pub(super) const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
 pub(super) const MAX_ANGLE_DEG: f64 = 10.0;
 /// Minimum overlap (IoU) of a detection with an optional instance that has no grasp.
 const SAME_PART_IOU: f64 = 0.5;
-/// Number of equal steps between the minimum scores from 0 to 1 for which the totals are computed.
+/// The totals are computed at minimum scores from 0 to 1; this is the number of equal steps between them.
 const NUM_SWEEP_STEPS: u32 = 50;
 
 /// The ground truth of an instance.
@@ -241,8 +241,8 @@ impl Judged {
 }
 
 /// Judges the detections with a score of at least `min_score`. In order of decreasing score, each takes the nearest
-/// free instance that it hits. No detection takes an instance from a better one, so a higher `min_score` only shortens
-/// the list.
+/// free instance that it hits. No detection takes an instance from a detection with a higher score, so a higher
+/// `min_score` only removes the last hits of the list.
 pub fn judge(tested: &Tested, min_score: f64) -> Judged {
     let mut found = vec![false; tested.truths.len()];
     let counted = tested.detections.iter().filter(|detection| detection.score >= min_score);

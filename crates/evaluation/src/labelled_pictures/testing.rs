@@ -21,8 +21,8 @@ pub struct TestedFolder {
 }
 
 impl LabelledFolder {
-    /// Searches the pictures in order. Pictures whose size differs from that of the model's region are left out.
-    /// `min_score` is used only in the reports of progress.
+    /// Searches the pictures in order. If the model has a region, pictures of another size than the one for which the
+    /// region is given are left out. `min_score` is used only in the reports of progress.
     ///
     /// # Errors
     /// A picture cannot be read, or detection fails.

@@ -23,7 +23,7 @@ const LOOK_ALIKE: &str = "neg_look";
 const MIRROR_IMAGE: &str = "mirror image";
 /// The kind of pictures with a mirrored look-alike.
 const MIRRORED_LOOK_ALIKE: &str = "neg_mirror";
-/// Maximum deviation of a symmetry from 360 degrees over an integer; smaller deviations are rounded.
+/// Maximum deviation of a symmetry from 360 degrees divided by an integer, in degrees; smaller deviations are rounded.
 const MAX_ROUNDING_DEG: f64 = 0.01;
 
 /// The entry of one picture.

@@ -11,8 +11,8 @@ use sdg_inputs::annotation_files::beside_photo;
 use sdg_inputs::demonstrations;
 use sdg_weights_conversion::sha256_of;
 
-/// Name of the file with the symmetries of parts for which `--symmetry` does not apply: lines with a part's name and 1
-/// to 360 or full.
+/// Name of the file with the symmetries of parts for which `--symmetry` does not apply. Each line has a part's name and
+/// its symmetry: 1 to 360, or `full`.
 const SYMMETRIES: &str = "symmetries.txt";
 const MAX_SYMMETRIES_BYTES: u64 = 1 << 20;
 

@@ -96,7 +96,7 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// The stored outcome of a part for this key; `None` if there is none, or one for another key.
+    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key.
     ///
     /// # Errors
     /// The record cannot be read or is damaged.

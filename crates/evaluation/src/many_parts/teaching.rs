@@ -29,8 +29,8 @@ pub struct PartTeaching<'a> {
 }
 
 impl PartTeaching<'_> {
-    /// Teaches the parts that have no model from these inputs yet. If interrupted, breaks with the next
-    /// part's name.
+    /// Teaches the parts whose outcome for these inputs is not stored yet. If interrupted, breaks with the name of the
+    /// first part without an outcome.
     ///
     /// # Errors
     /// Files cannot be read or written. A part that cannot be taught is an outcome, not an error.

@@ -117,7 +117,8 @@ impl Marks {
     }
 }
 
-/// The attempts stored in a file; empty if an earlier version recorded them: they are then made again.
+/// The attempts stored in a file; empty if there is no file. Attempts recorded by another version are ignored, so that
+/// they are made again.
 ///
 /// # Errors
 /// The errors of [`Store::read_made_with`].

@@ -20,7 +20,7 @@ pub struct WrittenTables {
     pub summaries: Vec<Summary>,
     /// Number of remaining units.
     pub remaining: usize,
-    /// All cells as JSON.
+    /// The results of all models and cells, as JSON.
     pub cells: PathBuf,
     /// The tables as Markdown.
     pub tables: PathBuf,

@@ -9,7 +9,7 @@ use sdg_simulation::views::{TestView, test_view, test_views};
 use super::records::{DetectionRecord, PictureRecord};
 use crate::trial::{Trial, try_view};
 
-/// A model's detections in a picture, with the check and without; the trial is the one with the check.
+/// A model's detections in a picture, with verification and without; the returned trial is the one with verification.
 pub(super) fn observe_picture(
     model: &GraspModel,
     object: &ObjectSpec,
@@ -27,7 +27,7 @@ pub(super) fn observe_picture(
 }
 
 /// A picture without the part: one to six unseen objects, some of which resemble parts. Every second picture also has
-/// another of the paper's eight parts, one after another, because the look-alikes in a workshop are real parts.
+/// another of the paper's eight parts, each in turn, because the look-alikes in a workshop are real parts.
 pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Result<(TestView, Option<&'static str>)> {
     if number.is_multiple_of(2) {
         return Ok((test_views(object, false, 1, seed).next().context("a picture")??, None));
@@ -42,8 +42,8 @@ pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Resu
 }
 
 /// The seed of a part's scenes, as for `sdg rehearse --seed`: the same for every model, and different for every part.
-/// With the same seed for all parts, one unfavourable lamp would count eight times, and the intervals would be too
-/// narrow.
+/// With the same seed for all parts, one scene with unfavourable light would count once for every part, and the
+/// intervals would be too narrow.
 pub(super) fn part_seed(seed: u64, object: &ObjectSpec) -> u64 {
     let place = ObjectSpec::names().position(|name| name == object.name).unwrap_or(0);
     seed.wrapping_mul(1000).wrapping_add(place as u64)

@@ -8,17 +8,17 @@
 //!                                                                         └─ Summary ─ tables: Markdown, JSON, page
 //! ```
 //!
-//! A **network** is taught; models B and C are two readings of one network. A **unit** is a piece of work for one
-//! worker: a teaching run, a model's attempts on a part, the pictures of a part. A teaching run, an attempt, and a
-//! model's results on the pictures of a part are stored completely or not at all. A **cell** is one model on one part.
-//! Random choices depend only on the seed, the part and the number of the attempt or picture, so every model gets the
-//! same scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list)
-//! repeats the attempts.
+//! A **network** is taught; models B and C use the same network. A **unit** is a piece of work for one worker: a
+//! teaching run, a model's attempts on a part, the pictures of a part. A teaching run, an attempt, and a model's
+//! results on the pictures of a part are stored completely or not at all. A **cell** is one model on one part. Random
+//! choices depend only on the seed, the part and the number of the attempt or picture, so every model gets the same
+//! scenes. `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's index in the list) repeats
+//! the attempts.
 //!
 //! In [`sharing`], many processes share the units, on the machines of a cluster.
 //!
-//! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching run without a
-//! model is a result as well: all attempts of its cell count as failed.
+//! Units in the store are not done again, so that an interrupted evaluation can be continued. A teaching run that gave
+//! no model is a result as well: all attempts of its cell count as failed.
 
 mod attempting;
 pub mod axes;

@@ -32,7 +32,7 @@ pub(super) fn do_unit(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Converts a panic to an error, so that the other units continue.
+/// Converts a panic to an error, which the caller treats like any other error of a unit.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
     // Unwind safety: the data that the closure changes belong to its unit and are dropped with the unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {

@@ -1,8 +1,8 @@
-//! The results of the paper.
+//! The results of the paper *SingleDemoGrasp*, whose models this project implements.
 
 use sdg_grasp::ModelKind;
 
-/// A row of the paper's Table II, completed from its text.
+/// A row of the paper's Table II, completed from the paper's text.
 pub struct PaperRow {
     pub samples: &'static str,
     /// Time from samples to model on a GTX 1080 Ti, in minutes and seconds.
@@ -21,7 +21,7 @@ pub const CPU_FRAMES_PER_SECOND: f64 = 0.4;
 /// The row of a model; `None` for a model that is not in the paper.
 ///
 /// # Source
-/// Table II; the success is from section VI, with a decimal. For A: samples, times and sizes of both networks.
+/// Table II; the success is from section VI, with one decimal. For A: samples, times and sizes of both networks.
 pub fn row(model: ModelKind) -> Option<PaperRow> {
     Some(match model {
         ModelKind::A => PaperRow {

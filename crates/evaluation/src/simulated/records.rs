@@ -143,12 +143,12 @@ impl DetectionRecord {
         }
     }
 
-    /// Whether the part was detected.
+    /// Whether a detection was accepted.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }
 
-    /// The error, if the part was detected.
+    /// The error, if a detection was accepted and the part is in the picture.
     pub fn error(&self) -> Option<DetectionError> {
         let (distance_mm, angle_deg) = self.error_mm.zip(self.error_deg)?;
         self.is_accepted().then_some(DetectionError { distance_mm, angle_deg })

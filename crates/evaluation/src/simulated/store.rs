@@ -32,7 +32,7 @@ use crate::error::EvaluationError;
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// The folder of an evaluation, locked by this process, alone or together with other processes.
+/// The folder of an evaluation. The lock on it is either exclusive or shared with other processes.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,

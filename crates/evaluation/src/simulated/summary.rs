@@ -105,7 +105,7 @@ impl Figures {
     }
 }
 
-/// The records that are summed in a row.
+/// The records that are summed for one row of a table.
 #[derive(Default)]
 struct Gathered {
     attempts: Vec<AttemptRecord>,

@@ -90,7 +90,7 @@ impl Evaluation<'_> {
         Ok(tasks)
     }
 
-    /// Whether a cell has or will have a model: not after its teaching has failed.
+    /// Whether a cell has a model or is still to be taught; false if its teaching has failed.
     fn is_usable(&self, cell: Cell) -> Result<bool> {
         Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }

@@ -1,4 +1,5 @@
-//! Every candidate and its class by the ground truth, as JSON lines, for studying the acceptance of detections.
+//! Every detection, accepted or refused, and its class by the ground truth, as JSON lines, for studying which
+//! detections are accepted.
 
 use anyhow::Result;
 use sdg_grasp::{DetectionRecord, GraspDetection, ModelKind};
@@ -8,12 +9,13 @@ use super::file::Side;
 use super::run::{Measured, SetRun, kind_of};
 use crate::labelled_pictures::{HitError, Tested, judge};
 
-/// Maximum distance of a candidate from an instance to be on it, in diagonals of the instance. Chosen by hand: no part
-/// extends farther from the centre of its grasp than a diagonal, and few extend half as far.
+/// Maximum distance between a detection and an instance, in diagonals of the instance, for the detection to be on the
+/// part. Chosen by hand: no part extends farther from the centre of its grasp than a diagonal, and few extend half as
+/// far.
 const MAX_ON_PART_DIAGONALS: f64 = 0.5;
 
-/// The class of a candidate relative to the nearest instance. The instance may be optional, and may also be hit by
-/// another candidate.
+/// The class of a detection relative to the nearest instance. The instance may be optional, and may also be hit by
+/// another detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Place {
@@ -27,7 +29,7 @@ enum Place {
     Wrong,
 }
 
-/// The kind of the instance that a candidate takes. Later candidates cannot take that instance.
+/// The kind of the instance that a detection takes. Detections with lower scores cannot take that instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Hit {
@@ -45,7 +47,7 @@ struct Candidate<'a> {
     image: String,
     kind: &'a str,
     place: Place,
-    /// The hit, matched one to one in order of decreasing score; null also for a second candidate on the same instance.
+    /// The hit, matched one to one in order of decreasing score; null also for a second detection on the same instance.
     hit: Option<Hit>,
     /// Distance from the nearest instance, in percent of its diagonal; null in pictures without an instance.
     distance_percent: Option<f64>,
@@ -54,7 +56,7 @@ struct Candidate<'a> {
     detection: DetectionRecord,
 }
 
-/// The lines of all candidates of a model.
+/// The lines of all detections of a model.
 ///
 /// # Errors
 /// No error occurs in practice: every record can be serialised.
@@ -71,7 +73,7 @@ pub fn candidates(measured: &Measured) -> Result<String> {
 }
 
 fn of_picture<'a>(model: ModelKind, run: &'a SetRun, tested: &'a Tested) -> impl Iterator<Item = Candidate<'a>> {
-    // All candidates count: a lower minimum score only makes the list of hits longer.
+    // All detections count: a lower minimum score only makes the list of hits longer.
     let hits = judge(tested, 0.0).hits;
     tested.detections.iter().zip(hits).map(move |(detection, hit)| {
         let nearest = nearest(tested, detection);

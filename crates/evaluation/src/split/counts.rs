@@ -38,7 +38,7 @@ impl Counts {
         }
     }
 
-    /// The figures on one line; a dash for a total of zero.
+    /// The figures on one line, without those whose total is zero; a dash if both totals are zero.
     pub fn in_words(&self) -> String {
         let found = format!("{} found, {} wrong", self.found, self.wrong.count);
         let false_alarms = format!("{} false alarms", self.false_alarms);

@@ -4,7 +4,7 @@
 //! ```text
 //! split file ─ SplitSet ─ ReadySet: demonstration, ground truth ─ teach, detect ─ SetRun ─ Measured: one model, all seeds
 //!                                                                                             │
-//!                                                       tables, JSON, one line per candidate ─┘
+//!                                                       tables, JSON, one line per detection ─┘
 //! ```
 //!
 //! A **side** is one of tuned, used and reported. **Wrong** is the fraction of detections without a hit among all

@@ -15,7 +15,7 @@ use super::file::SplitSet;
 use crate::labelled_pictures::{LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
 use crate::taught_file::TaughtFile;
 
-/// A set whose files were read and checked.
+/// A set whose demonstration was read, and whose `truth.json`, if there is one, was checked.
 pub struct ReadySet {
     pub set: SplitSet,
     folder: PathBuf,
@@ -45,7 +45,8 @@ pub(super) fn kind_of(tested: &Tested) -> &str {
 }
 
 impl ReadySet {
-    /// Reads and checks the files of a set, before teaching, which takes long.
+    /// Reads the demonstration of a set and checks its `truth.json`, if there is one, before teaching, which takes
+    /// long.
     ///
     /// # Errors
     /// The folder does not exist, or the demonstration or the `truth.json` is invalid.

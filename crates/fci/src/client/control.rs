@@ -120,8 +120,8 @@ impl Robot {
         })
     }
 
-    /// Commands any generator with any controller; the closure sets the fields that both use. This function sets
-    /// `message_id` and the flags that end the motion.
+    /// Sends commands for any combination of generator and controller; the closure sets the fields that both use. This
+    /// function sets `message_id` and the flags that end the motion.
     ///
     /// # Errors
     /// As for [`Robot::control_joint_positions`].

@@ -27,7 +27,7 @@ impl Default for HandConfig {
     }
 }
 
-/// A connected hand. Calls that move the fingers return when these have stopped.
+/// A connected hand. Calls that move the fingers return after the fingers have stopped.
 #[derive(Debug)]
 pub struct Hand {
     session: Session,
@@ -54,7 +54,8 @@ impl Hand {
     ///
     /// # Errors
     /// [`FciError::Socket`]; [`FciError::Version`] for a hand with another protocol version; [`FciError::Timeout`] or
-    /// [`FciError::Closed`] if the hand does not answer.
+    /// [`FciError::Closed`] if the hand does not answer; [`FciError::Wire`] or [`FciError::Refused`] for an answer that
+    /// is invalid or has no version.
     pub fn connect(host: &str, config: &HandConfig) -> Result<Self> {
         let mut session = Session::connect(resolve(host, config.port)?, HeaderKind::Hand, config.timeout)?;
         let request = HandRequest::Connect { version: HAND_VERSION, udp_port: session.udp_port()? };
@@ -76,7 +77,8 @@ impl Hand {
     /// Waits for the hand's next state.
     ///
     /// # Errors
-    /// [`FciError::Timeout`] or [`FciError::Closed`] if the hand is disconnected.
+    /// [`FciError::Timeout`], [`FciError::Closed`] or [`FciError::Socket`] if the hand is disconnected,
+    /// [`FciError::Wire`] for an invalid state.
     pub fn read_state(&mut self) -> Result<HandState> {
         self.session.receive(STATE_SIZE, true, HandState::decode)
     }

@@ -22,7 +22,8 @@ const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
 pub struct RobotConfig {
     /// TCP port of the robot.
     pub port: u16,
-    /// The protocol version. With `None`, the client tries version 5, then version 10 if the robot answers with it.
+    /// The protocol version. With `None`, the client tries version 5, and then version 10 if the robot answers that it
+    /// uses version 10.
     pub version: Option<Version>,
     /// Maximum duration of a wait for a response or a state; for stop and recovery it is 10 s.
     pub timeout: Duration,
@@ -68,7 +69,8 @@ impl Robot {
     ///
     /// # Errors
     /// [`FciError::Socket`]; [`FciError::Version`] for a robot with an unsupported protocol version;
-    /// [`FciError::Timeout`] if no state arrives (often because a firewall blocks UDP).
+    /// [`FciError::Timeout`] if no response or no state arrives (the latter often because a firewall blocks UDP);
+    /// [`FciError::Closed`]; [`FciError::Wire`] for an invalid message.
     pub fn connect(host: &str, config: &RobotConfig) -> Result<Self> {
         let address = resolve(host, config.port)?;
         match config.version {
@@ -128,8 +130,8 @@ impl Robot {
     /// Waits for the next state.
     ///
     /// # Errors
-    /// [`FciError::Timeout`] or [`FciError::Closed`] if the robot is disconnected, [`FciError::Wire`] for an invalid
-    /// state.
+    /// [`FciError::Timeout`], [`FciError::Closed`] or [`FciError::Socket`] if the robot is disconnected,
+    /// [`FciError::Wire`] for an invalid state.
     pub fn read_state(&mut self) -> Result<&RobotState> {
         self.receive(true)?;
         Ok(&self.state)

@@ -159,8 +159,8 @@ impl Session {
 
     /// Waits for a datagram of the peer and returns the newest one.
     ///
-    /// `decode` converts a datagram to a state; a datagram that it rejects is an error. If `discard_waiting` is set,
-    /// datagrams received before the call are ignored.
+    /// `decode` converts a datagram to a state; if it rejects the newest datagram, its error is returned. If
+    /// `discard_waiting` is set, datagrams received before the call are ignored.
     pub(crate) fn receive<T>(
         &mut self,
         size: usize,

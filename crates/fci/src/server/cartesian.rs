@@ -1,5 +1,5 @@
-//! Poses, twists and the elbow: the next reference from a command, the check of its limits, and the joint motion for
-//! it.
+//! Poses, twists and the elbow: computes the next reference from a command, checks it against the limits, and computes
+//! the joint motion that leads to it.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
@@ -10,8 +10,8 @@ use crate::pose::{difference, is_rigid, isometry, moved};
 use crate::wire::MotionCommand;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 
-/// Largest distance of a motion's first pose from the end effector. Not published by libfranka; the value is
-/// franka-sim's.
+/// Largest distance of a motion's first pose from the end effector. Not published by libfranka; the value is that of
+/// franka-sim, another simulated robot.
 const START_TRANSLATION_M: f64 = 0.05;
 const START_ROTATION_RAD: f64 = 0.1;
 /// Largest distance of the first elbow from the measured one. Not published by libfranka; the value is franka-sim's.

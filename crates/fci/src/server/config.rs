@@ -11,7 +11,7 @@ use crate::wire::{HAND_PORT, ROBOT_PORT};
 pub enum Pace {
     /// A thousand cycles per second, as on a robot; late commands are lost.
     RealTime,
-    /// During motions, the next cycle starts after the client's answer, or after `max_wait` as with a lost command.
+    /// During motions, the next cycle starts after the client's answer or, as if a command were lost, after `max_wait`.
     /// The simulation advances only during motions and while arm or fingers move, so that a run is the same on every
     /// machine.
     Lockstep {

@@ -14,8 +14,8 @@ use crate::wire::{Header, HeaderKind};
 
 /// Time within which a client must accept a response; a slower client counts as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// Time for which a second client waits until the first one disconnects, so that a client that has just disconnected
-/// can connect again at once. It is shorter than a client's timeout for an answer (1 s).
+/// Maximum time for which a second client waits for the first one to disconnect: a client that has just disconnected
+/// can therefore connect again at once. The time is shorter than a client's timeout for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 /// Maximum number of events that wait for the loop; a client's further messages wait in the network.
 const MAX_EVENTS: usize = 64;
@@ -159,7 +159,7 @@ impl Link {
         }
     }
 
-    /// The next datagram of the client, without waiting, and its length.
+    /// Reads the client's next datagram into `buffer` and returns its length. Waits only after [`Link::set_waiting`].
     pub fn receive(&self, buffer: &mut [u8]) -> Option<usize> {
         let peer = self.udp_peer()?;
         for _ in 0..MAX_DATAGRAMS {
@@ -247,7 +247,7 @@ impl Drop for Link {
         // This connection wakes the thread that waits for clients.
         let _ = TcpStream::connect_timeout(&self.address, WRITE_TIMEOUT);
         if let Some(listener) = self.listener.take() {
-            // The thread may wait for room for an event.
+            // The thread may wait until the queue has room for an event.
             while !listener.is_finished() {
                 while self.events.try_recv().is_ok() {}
                 thread::sleep(Duration::from_millis(1));
@@ -277,7 +277,7 @@ fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: 
     loop {
         let event = match read_message(&mut stream, kind) {
             Ok(Ok((header, payload))) => LinkEvent::Message(session, header, payload),
-            // An invalid header ends the connection like a closed one.
+            // An invalid header ends the connection, like the end of the stream.
             Ok(Err(_)) | Err(_) => LinkEvent::Gone(session),
         };
         let is_end = matches!(event, LinkEvent::Gone(..));

@@ -11,8 +11,8 @@ use crate::pose::difference;
 use crate::wire::robot_error::{RobotError, RobotErrors};
 use crate::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand};
 
-/// Largest distance of a motion's first position from the reference. Not published by libfranka; the value is
-/// franka-sim's.
+/// Largest distance of a motion's first position from the reference. Not published by libfranka; the value is that of
+/// franka-sim, another simulated robot.
 const START_POSITION_RAD: f64 = 0.1;
 
 /// Function from joint positions to `base_from_ee` and the Jacobian of the end effector.

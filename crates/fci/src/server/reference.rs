@@ -57,7 +57,7 @@ impl JointReference {
     }
 
     /// This motion with the acceleration that brakes it, or its position at rest if it ends within a cycle. The
-    /// controller then has no difference to correct: a reference that moved on would press on an obstacle.
+    /// controller has no difference to correct, whereas a reference that moved on would press on an obstacle.
     pub fn yielding(&self, limits: &Limits) -> Self {
         let braked = self.braked(limits);
         if braked.is_at_rest() { Self::at_rest(self.q) } else { Self { ddq: braked.ddq, ..*self } }

@@ -281,8 +281,9 @@ impl RobotCore {
         }
     }
 
-    /// Stops because of errors: the motion ends and the arm brakes, from its measured motion after a collision or if
-    /// the client controlled the torques, otherwise from its reference. Nothing moves until the recovery.
+    /// Stops because of errors: the motion ends and the arm brakes. Braking starts from the measured motion after a
+    /// collision or if the client controlled the torques, otherwise from the reference. No motion can start until the
+    /// recovery.
     pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;
@@ -424,7 +425,8 @@ mod tests {
         stops_within_the_limit_of_acceleration(|robot| robot.abort(RobotError::JointReflex.into()));
     }
 
-    /// A motion of the last joint at 1.5 rad/s, which `stop` ends, or the lack of further commands.
+    /// Moves the last joint at 1.5 rad/s, then calls `stop` and sends no further commands; checks the acceleration of
+    /// braking.
     fn stops_within_the_limit_of_acceleration(stop: impl Fn(&mut RobotCore)) -> RobotCore {
         const JOINT: usize = 6;
         const ACCELERATION: f64 = 5.0;

@@ -141,7 +141,7 @@ impl HandRequest {
 pub enum HandStatus {
     /// Done.
     Success = 0,
-    /// The hand failed; as an answer to Connect, it has another version.
+    /// The command failed; as an answer to Connect: the hand uses another version.
     Fail = 1,
     /// Done, but the width is not within the tolerance.
     Unsuccessful = 2,

@@ -46,7 +46,7 @@ impl Header {
     pub fn message(kind: HeaderKind, command: u32, command_id: u32, payload: &[u8]) -> Vec<u8> {
         let mut header = Self { command, command_id, size: (kind.size() + payload.len()) as u32 };
         let mut encoder = Encoder::new(Real::F64);
-        // An encoder has no error.
+        // Encoding never fails.
         let _ = header.fields(&mut encoder, kind);
         let mut bytes = encoder.into_bytes();
         bytes.extend_from_slice(payload);

@@ -60,7 +60,7 @@ impl RobotCommand {
     /// The datagram.
     pub fn encode(&self, version: Version) -> Vec<u8> {
         let mut encoder = Encoder::new(Real::F64);
-        // An encoder has no error.
+        // Encoding never fails.
         let _ = self.clone().fields(&mut encoder, version);
         encoder.into_bytes()
     }

@@ -24,7 +24,7 @@ pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 
 /// effector `NE`, `ee` is the end effector `EE`, and `stiffness` is `K`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotState {
-    /// Milliseconds since the robot started; a command answers the state with the same number.
+    /// Milliseconds since the robot started; a command carries the number of the state that it answers.
     pub message_id: u64,
     /// Measured pose of the end effector (`O_T_EE`).
     pub base_from_ee: Transform,
@@ -175,7 +175,7 @@ impl RobotState {
     /// The datagram.
     pub fn encode(&self, version: Version) -> Vec<u8> {
         let mut encoder = Encoder::new(version.state_real());
-        // An encoder has no error.
+        // Encoding never fails.
         let _ = self.clone().fields(&mut encoder, version);
         encoder.into_bytes()
     }

@@ -19,7 +19,7 @@ use signal::{Axis, Signal};
 
 /// Distance from the limit, inside and outside, as a fraction of the limit.
 const MARGIN: f64 = 0.005;
-/// Excess of measured velocities over the limit, rad/s, at or soon after which the robot stops.
+/// Excess over the limit of a measured joint velocity in the motion outside, rad/s: the robot must stop that motion.
 const MEASURED_BEYOND: f64 = 0.4;
 /// Margin for measured velocities of the end effector, m/s: they overshoot the commanded ones, and a robot may tolerate
 /// them up to 0.1 m/s above the limit.

@@ -80,7 +80,7 @@ pub fn go_to(robot: &mut Robot, goal: &[f64; 7]) -> Result<(), FciError> {
     Ok(())
 }
 
-/// Milliseconds of the robot since the first state of a motion.
+/// Milliseconds since the first state of a motion, by the robot's clock.
 #[derive(Debug, Default)]
 struct Clock(u64);
 
@@ -162,8 +162,8 @@ impl Signal {
     /// Sets the command of the `ms`th cycle; returns true in the last.
     fn fill(&self, command: &mut RobotCommand, ms: u64, state: &RobotState, start: &RobotState) -> bool {
         let motion = &mut command.motion;
-        // A profile starts later, because the first command of a motion has other rules, and torques replace the
-        // internal controller.
+        // A profile starts later, because the first command of a motion has limits of its own, and because torques
+        // replace the internal controller.
         let since_start = ms.checked_sub(PROFILE_START_MS);
         match self {
             Signal::Elbow { .. } if since_start.is_none() => motion.valid_elbow = true,

@@ -51,7 +51,7 @@ impl PlumbBob {
         self.grows_up_to(point.coords.norm_squared()).then(|| self.polynomial(point))
     }
 
-    /// The point at depth 1 that the lens maps to this position; `None` if none is found.
+    /// The point at depth 1 that the lens maps to this position; `None` if no such point is found.
     pub fn undistort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         if *self == Self::NONE {
             return Some(*point);

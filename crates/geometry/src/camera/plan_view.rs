@@ -76,8 +76,8 @@ pub enum PlanViewError {
     },
 }
 
-/// Number of intervals along each side of the picture, in the grid of pixels that are mapped to the plane: fine enough
-/// that no corner of the visible plane is missed by more than a percent.
+/// Number of intervals along each side of the picture in the grid of pixels that are mapped to the plane. With this
+/// number, at most a percent of the visible plane is missing at each of its corners.
 const GRID: u32 = 32;
 /// Maximum length of a pixel on the plane, as a multiple of the smallest one. Towards the horizon, longer pixels show
 /// too little to find parts. Chosen by hand.

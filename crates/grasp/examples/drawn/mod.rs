@@ -1,4 +1,4 @@
-//! Generated parts with pictures, for fitting or training.
+//! Generated parts with pictures, for fitting, training or measuring.
 
 use sdg_grasp::TaughtDemonstration;
 use sdg_grasp::fitting::{FitInstance, FitPart, FitPicture};

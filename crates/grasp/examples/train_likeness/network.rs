@@ -149,8 +149,8 @@ pub fn train(
     network.valid().file()
 }
 
-/// The examples of the indices and `num_rendered` rendered ones, each changed by its own random stream; two threads
-/// make them.
+/// The examples of the indices and `num_rendered` rendered ones, each randomly changed with its own random stream; two
+/// threads make them.
 fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize, seed: u64) -> Vec<(Vec<f32>, bool)> {
     let make = |k: usize| {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed.wrapping_add(k as u64));

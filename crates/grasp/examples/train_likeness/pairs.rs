@@ -105,7 +105,7 @@ impl Pairs {
         Ok(write_atomically(path, &self.bytes)?)
     }
 
-    /// All examples.
+    /// Number of all examples.
     pub fn len(&self) -> usize {
         self.bytes.len() / RECORD
     }
@@ -115,7 +115,7 @@ impl Pairs {
         (0..self.len()).filter(|&idx| pair_facts(self.record(idx)).stream == stream as u8).collect()
     }
 
-    /// Numbers of correct and wrong examples.
+    /// Numbers of correct and wrong examples of a stream.
     pub fn counts(&self, stream: Stream) -> (usize, usize) {
         let of_it = self.of(stream);
         let right = of_it.iter().filter(|&&idx| self.is_right(idx)).count();
@@ -185,7 +185,7 @@ pub fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3
     Some(std::array::from_fn(|c| corners.iter().zip(weights).map(|(corner, weight)| weight * corner[c]).sum()))
 }
 
-/// Changes exposure, gamma and tint, and adds noise; `strength` scales all changes.
+/// Changes exposure, gamma and tint, and adds noise; `strength` scales the changes but not the noise.
 fn in_other_light(colors: &[Option<[f32; 3]>], strength: f32, rng: &mut Pcg64Mcg) -> Vec<Option<[f32; 3]>> {
     let mut range = |most: f32| rng.random_range(-most..most) * strength;
     let (gain, gamma) = (range(EXPOSURE).exp(), range(GAMMA).exp());

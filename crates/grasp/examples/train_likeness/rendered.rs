@@ -15,7 +15,7 @@ use crate::pairs::changed;
 
 /// One part in this many is held out, if parts are held out.
 const HELD_OUT: usize = 4;
-/// Fraction of correct examples. Chosen by hand.
+/// Fraction of examples drawn from the correct ones, if the part also has wrong ones. Chosen by hand.
 const RIGHT_SHARE: f64 = 0.55;
 /// Fraction of examples whose photo is another picture of the part. Chosen by hand.
 const OTHER_PHOTO_SHARE: f64 = 0.6;

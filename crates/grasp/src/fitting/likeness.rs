@@ -9,11 +9,11 @@ use crate::taught::TaughtDemonstration;
 use crate::teach::symmetry::HiddenTurns;
 use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
-/// Number of wrong poses used per picture, in descending agreement.
+/// Maximum number of wrong poses used per picture, in descending agreement.
 const WRONG_A_PICTURE: usize = 3;
 
-/// A pose that is not correct but within this distance of an instance, as a fraction of its diagonal and in radians,
-/// counts as neither correct nor wrong, because the part's height may displace the pose.
+/// Maximum distance of a nearly correct pose from an instance, as a fraction of the instance's diagonal and in radians.
+/// A nearly correct pose counts as neither correct nor wrong, because the part's height may have displaced it.
 const NEARLY: (f64, f64) = (0.15, 0.3);
 
 /// A photo and an aligned picture.
@@ -23,11 +23,11 @@ pub struct LikenessExample {
     pub picture_idx: usize,
     /// The network's input.
     pub pair: Pair,
-    /// Whether the picture shows the part at this place.
+    /// Whether the picture shows the part at the pose of the alignment.
     pub is_right: bool,
 }
 
-/// The best correct pose of every instance, and the three best wrong poses of every picture, by agreement.
+/// The best correct pose of every instance, and up to three of the best wrong poses of every picture, by agreement.
 ///
 /// # Errors
 /// A part that cannot be taught.

@@ -8,8 +8,8 @@ use crate::verdict::judge_picture;
 const MIN_SCORE: f64 = 0.01;
 
 /// Number of refused correct detections that cost as much as one accepted wrong detection. Before a network compared
-/// photo and picture, the value was 3, since 1 gave false alarms in the paper's protocol. With the network, the best
-/// wrong pose in that protocol stays far below 0.5.
+/// photo and picture, the value was 3, since 1 gave false alarms in the paper's evaluation. With the network, the score
+/// of the best wrong pose in that evaluation stays far below 0.5.
 pub(super) const COST_OF_WRONG: f64 = 1.0;
 
 /// The loss of wrong decisions; see [`crate::fitting`] for the definition.
@@ -113,7 +113,7 @@ mod tests {
     use crate::verdict::tests::look;
     use sdg_shape::Evidence;
 
-    /// A score from the edges alone: 10 per unit above 0.5.
+    /// A score from the edges alone: log-odds of 10 per unit above 0.5.
     fn edges_alone() -> ScoreConfig {
         let none = Term { weight: 0.0, neutral: 0.0, range: [0.0, 1.0] };
         ScoreConfig {

@@ -5,17 +5,17 @@
 //! constant × grid ─ observe again ─ regression again ────────────────────────┴─ loss on the training half ──┤
 //!                                                       best value of each ─── loss on the held-out half ───┘
 //! ```
-//! First the weights of the score are fitted, without searching the pictures again. Then each constant of
-//! [`CheckConfig::search`] is fitted alone, with the others at their present values. For each value the weights are
-//! fitted again, and for each value but the present one the pictures are searched again, because the evidence depends
-//! on the constants.
+//! First the pictures are searched once, and the weights of the score are fitted. Then each listed constant of
+//! [`CheckConfig::search`] ([`constant_names`]) is fitted alone, with the others at their present values. For each
+//! value the weights are fitted again, and for each value but the present one the pictures are searched again, because
+//! the evidence depends on the constants.
 //!
 //! **Loss** ([`Loss`]). A picture's detections are scored as in detection. Let p be the best score of a correct pose of
-//! an instance and q the best score of a wrong pose in a picture, each 0 if there is none; both are clamped to 0.01 and
-//! 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss
-//! of several parts is their mean. The minimum is 0.02. A correct pose lies within 4 % of the part's diagonal and 10°
-//! of an instance, up to its symmetry. Poses on a part that differs only in size count as neither correct nor wrong:
-//! without a calibrated camera, that part looks like the taught one at another distance.
+//! an instance and q the best score of a wrong pose in a picture, each 0 if there is none; both are clamped to the
+//! range from 0.01 to 0.99. A part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the
+//! pictures; the loss of several parts is the mean of their losses. The minimum is 0.02. A correct pose lies within 4 %
+//! of the part's diagonal and 10° of an instance, up to its symmetry. Poses on a part that differs only in size count
+//! as neither correct nor wrong: without a calibrated camera, that part looks like the taught one at another distance.
 //!
 //! **Intervals.** Parts are independent, pictures of one part are not. A difference between two values is therefore
 //! computed per part; its interval is the mean ± 1.96 standard errors of those differences.
@@ -55,8 +55,8 @@ pub struct FitOptions {
     pub only: Vec<String>,
 }
 
-/// The name of the score's weights among the names of the constants. The weights are always fitted; with this name
-/// alone, nothing else is.
+/// The name of the score's weights among the names of the constants. The weights are always fitted; if this is the only
+/// chosen name, no constant is.
 const SCORE: &str = "score";
 
 /// The names of all constants that can be fitted, and of the score's weights.
@@ -81,11 +81,11 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the
-/// progress.
+/// Fits the score's weights and each chosen constant on `training`, and reports the effect on `held_out`; `observe` is
+/// called with the progress.
 ///
 /// # Errors
-/// A name that belongs to no constant, fewer than two parts in either half, and a part that cannot be taught.
+/// A name that belongs to no constant, a half with fewer than two parts, and a part that cannot be taught.
 pub fn fit(
     training: &[FitPart],
     held_out: &[FitPart],

@@ -23,7 +23,7 @@ const RIGHT_DEGREES: f64 = 10.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseObservation {
     pub(super) clues: Clues,
-    /// The instance of which this is a correct pose.
+    /// The instance of which this is a correct pose; `None` for a wrong pose.
     pub(super) instance_idx: Option<usize>,
 }
 

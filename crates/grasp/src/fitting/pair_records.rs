@@ -21,7 +21,7 @@ pub struct PairFacts {
     pub stream: u8,
     /// Index of the part.
     pub part_idx: u16,
-    /// Whether the picture shows the part at this place.
+    /// Whether the picture shows the part at the pose of the alignment.
     pub is_right: bool,
     /// Whether the part is uncovered, so that the picture can serve as a photo of it.
     pub is_clear: bool,

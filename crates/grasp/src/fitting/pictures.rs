@@ -26,7 +26,7 @@ pub struct FitPicture {
     pub undecided: Vec<BoundingBox>,
 }
 
-/// The position of a part.
+/// An instance of the part in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitInstance {
     /// The true marks, in pixels of the picture.

@@ -1,8 +1,8 @@
 //! The score's weights, by logistic regression.
 //!
-//! As in detection, only the best correct pose of an instance and the best wrong pose of a picture count: the
-//! regression is repeated, each time on the poses that the last weights rank first. Instances, pictures and parts have
-//! the same weights as in the loss of [`crate::fitting`].
+//! Only the best correct pose of an instance and the best wrong pose of a picture count, as in the loss. Therefore the
+//! regression is repeated, each time on the poses that the previous weights rank first. Instances, pictures and parts
+//! have the same weights as in the loss of [`crate::fitting`].
 //!
 //! Legend: `x` the values of a pose's terms, clamped to their ranges; `w` the weights, the bias last; `y` 1 for
 //! correct.
@@ -40,7 +40,8 @@ struct Example {
     weight: f64,
 }
 
-/// The weights that fit `parts` best, starting from `from`, whose ranges are kept.
+/// The weights that fit `parts` best, starting from `from`, whose ranges are kept; `from` itself if there are not both
+/// correct and wrong poses.
 pub(super) fn fit_score(parts: &[PartObservations], from: &ScoreConfig) -> ScoreConfig {
     let parts: Vec<&PartObservations> = parts.iter().filter(|part| part.coverage() >= MIN_COVERAGE).collect();
     let mut config = *from;
@@ -245,9 +246,9 @@ fn regression(examples: &[Example]) -> Weights {
     weights
 }
 
-/// The score of `config` with other neutral values: half-way between the medians of correct and wrong poses, so that a
-/// positive contribution supports the part; for resemblance the median of all; for size and outside 0, their best
-/// value; for the terms from details on, an end of the range.
+/// `config` with other neutral values but unchanged scores. A neutral value is half-way between the medians of correct
+/// and wrong poses, so that a positive contribution supports the part. For resemblance it is the median of all poses,
+/// for size and outside 0 (their best value), and for the terms from details on an end of the range.
 fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> ScoreConfig {
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {

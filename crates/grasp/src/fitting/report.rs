@@ -165,7 +165,7 @@ fn change(f: &mut fmt::Formatter<'_>, before: &Loss, after: &Loss, difference: &
     )
 }
 
-/// The conclusion of the fit for a constant.
+/// Whether the fit changes a constant or the weights, in words.
 fn verdict(is_other: bool, difference: &Difference) -> &'static str {
     match (is_other, difference.is_improvement()) {
         (false, _) => "no",

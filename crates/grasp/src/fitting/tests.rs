@@ -44,7 +44,7 @@ fn a_fit_reports_today_and_the_best_of_the_grid() {
         FitEvent::Score(score) => assert!(score.before.accepted[1] > 0),
     })
     .unwrap();
-    // The two other values of each constant.
+    // The values of each constant except the present one.
     assert_eq!(heard, [5.0, 20.0, 0.2, 0.6]);
     assert_eq!(report.constants.len(), 2);
     for constant in &report.constants {

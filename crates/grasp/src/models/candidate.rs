@@ -1,4 +1,4 @@
-//! A network's proposals: places of an image, each converted to a pose of a demonstration.
+//! A network's candidates: boxes in an image, each converted to a pose of a demonstration.
 
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};

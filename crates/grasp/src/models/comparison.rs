@@ -97,9 +97,9 @@ impl<'a> Comparer<'a> {
         candidates.into_iter().filter_map(likeliest).collect()
     }
 
-    /// Each candidate at the position of the part's features in views of twice the resolution, or rotated by 180° if
-    /// the features are then more similar, with a score that includes this similarity. The most likely candidates come
-    /// first.
+    /// Each candidate at the position of the part's features in views of twice the resolution, with a score that
+    /// includes the similarity of the features. The first [`MAX_TURNED`] candidates, which must be the most likely
+    /// ones, are rotated by 180° if the features are then more similar.
     async fn aligned(&self, compared: Vec<Compared>) -> Vec<PoseCandidate> {
         let reference = |one: &PoseCandidate| self.demonstration(one).finer_reference(self.network.config());
         let ways = |(idx, (one, _)): (usize, &Compared)| match idx {

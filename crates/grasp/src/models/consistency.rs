@@ -43,7 +43,7 @@ const MAX_PROBABILITY: f64 = 1.0 - 1e-6;
 pub(super) struct ComparisonEvidence {
     /// Log-odds that the place shows the part.
     pub(super) log_odds: f64,
-    /// The mean cosine of the part's features in the finer views; `None` before the comparison.
+    /// The mean cosine of the part's features in the finer views; `None` before the comparison in these views.
     pub(super) cosine: Option<f64>,
 }
 

@@ -45,7 +45,7 @@ impl MaskMatcher {
     /// Extracts texture and outline of the demonstrations.
     ///
     /// # Errors
-    /// A demonstration without texture and outline.
+    /// A demonstration with neither texture nor outline.
     pub(crate) fn new(demonstrations: &[TaughtDemonstration]) -> Result<Self> {
         let estimator = RotationEstimator::new(Sift::new(SiftConfig::default())?, rotation())?;
         let templates = demonstrations

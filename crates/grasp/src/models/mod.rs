@@ -130,8 +130,8 @@ impl Network {
         Self { detector: self.detector.to_device(device), reading, comparison }
     }
 
-    /// The network's proposals, best first. Detections that give no pose (coincident keypoints, a mask without an
-    /// orientation) are left out.
+    /// The network's candidates, best first, and all its boxes. Boxes that give no pose (coincident keypoints, a mask
+    /// without an orientation) have no candidate.
     ///
     /// # Errors
     /// An image that is invalid for the network.

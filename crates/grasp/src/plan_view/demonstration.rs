@@ -48,7 +48,7 @@ pub fn seen_from_above(
     Ok((made, lengths))
 }
 
-/// Pictures without the part in the same plan view.
+/// Pictures without the part, in the plan view with these lengths.
 ///
 /// # Errors
 /// A camera whose pictures do not show the plane.

@@ -74,7 +74,7 @@ pub struct PlanViewDetection {
     pub pose: PlanarPose,
 }
 
-/// Number of pixels above which a search becomes slow. Chosen by hand.
+/// Maximum number of pixels of a plan view, above which a search becomes slow. Chosen by hand.
 const MAX_PLAN_PIXELS: u64 = 6_000_000;
 
 /// A model used with a calibrated camera.
@@ -303,13 +303,13 @@ impl PlanViewDetector {
 }
 
 /// The tangent of the angle between a line of sight and the vertical, in the directions x and y of the plan view: the
-/// apparent displacement of a point one metre above the plane.
+/// apparent displacement, in metres, of a point one metre above the plane.
 pub(crate) fn slant(camera: &PosedCamera, point: &Point3<f64>) -> [f64; 2] {
     let sight = point.coords - camera.world_from_camera.translation.vector;
     [sight.x / -sight.z, sight.y / sight.z]
 }
 
-/// The part of the marks' plane in the camera's picture, at the resolution of the model's demonstrations.
+/// The plan view of the visible area of the marks' plane, at the resolution of the model's demonstrations.
 pub(crate) fn plan_view(over_table: &CameraOverTable, lengths: &Lengths) -> Result<PlanView> {
     let CameraOverTable { camera, table_height_m, workspace } = over_table;
     let height = table_height_m + lengths.mark_height_m;

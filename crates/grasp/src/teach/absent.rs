@@ -74,7 +74,7 @@ impl AbsentSamples {
     }
 }
 
-/// The network's highest score in each picture; 0 without a proposal.
+/// The network's highest score in each picture; 0 without a candidate.
 ///
 /// # Errors
 /// A picture that is invalid for the network.

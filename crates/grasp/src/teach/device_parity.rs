@@ -82,8 +82,8 @@ fn every_stage_of_every_network_agrees() {
     }
 }
 
-/// Detections on an object. Without the part the pose is undetermined: the refinement ends at a pose that depends on
-/// the last bits.
+/// The detections with enough agreement, or without verification. With less agreement the part is absent and the pose
+/// undetermined: the refinement ends at a pose that depends on the last bits of the values.
 fn placed(detections: &[GraspDetection]) -> Vec<&GraspDetection> {
     let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.min_agreement;
     detections.iter().filter(|detection| detection.agreement.is_none_or(is_placed)).collect()

@@ -4,7 +4,7 @@ use sdg_detection::config::Freeze;
 use sdg_training::{EarlyStop, TrainingConfig, ValidationConfig};
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of steps; a good network stops earlier.
+/// Maximum number of steps; the training stops earlier if the network is good.
 const STEPS: usize = 120;
 
 /// The differences from the preset's teaching.
@@ -24,8 +24,8 @@ pub struct FineTuning {
 
 impl FineTuning {
     /// Settings with which teaching takes half a minute on two cores, with two dozen other parts. For most parts the
-    /// network is good enough after 40 steps; in about six of 30 held-out samples with the part, it is so covered or
-    /// blurred that no network finds it.
+    /// network is good enough after 40 steps; in about six of 30 held-out samples with the part, the part is so covered
+    /// or blurred that no network finds it.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {

@@ -25,11 +25,11 @@ pub(super) struct Calibrated {
     pub(super) network: NetworkCalibration,
     /// Number of samples with the part.
     pub(super) positives: usize,
-    /// Number of samples in which a proposal of the network led to a correct pose of the demonstration.
+    /// Number of samples in which a candidate of the network led to a correct pose of the demonstration.
     pub(super) hits: usize,
-    /// The network's scores where network or search found the part; 0 without a proposal.
+    /// The network's scores where network or search found the part; 0 without a box.
     pub(super) on_part: Vec<f64>,
-    /// The network's scores on the place most similar to the part in samples without it; 0 without a proposal.
+    /// The network's scores on the place most similar to the part in samples without it; 0 without a box.
     pub(super) elsewhere: Vec<f64>,
     /// Median error after verification, in pixels of the demonstration; infinite if nothing was found.
     pub(super) error_px: f64,
@@ -39,7 +39,7 @@ pub(super) struct Calibrated {
 
 /// The observations in one sample.
 struct Seen {
-    /// The network's highest score on the part where the network proposed it.
+    /// The network's highest score on the part where a candidate of the network found it.
     proposed_on_part: Option<f64>,
     /// The network's highest score on the part where network or search found it.
     on_part: Option<f64>,
@@ -52,7 +52,7 @@ struct Seen {
 }
 
 impl HeldBack<'_> {
-    /// A network's proposals in each sample.
+    /// A network's boxes and candidates in each sample.
     ///
     /// # Errors
     /// An image that is invalid for the network.
@@ -60,7 +60,7 @@ impl HeldBack<'_> {
         side_by_side(self.samples, |sample| network.proposals(&sample.image, demonstrations))
     }
 
-    /// The detections of the network alone, from its proposals in each sample.
+    /// The result of the network alone in each sample: its best candidate, compared with the truth.
     pub(super) fn outcomes(&self, proposals: &[Proposals]) -> Vec<Outcome> {
         let outcome =
             |(sample, proposals): (&Sample, &Proposals)| match (proposals.candidates.first(), sample.objects.first()) {
@@ -71,7 +71,7 @@ impl HeldBack<'_> {
         self.samples.iter().zip(proposals).map(outcome).collect()
     }
 
-    /// Calibrates a network by its proposals in each sample, verified by the demonstration as in detection.
+    /// Calibrates a network by its candidates in each sample, verified by the demonstration as in detection.
     /// `other_parts` are the network's highest scores in pictures of other parts only, `usual_threshold` is
     /// [`Network::usual_threshold`].
     ///

@@ -219,7 +219,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions) -> 
     })
 }
 
-/// Number of windows from which the last layers of our base weights are computed before training.
+/// Number of windows from which this project's base weights compute the detector's last layers before training.
 const NUM_VIEWS: usize = 64;
 
 /// Teaches a model with a network. Samples are made from `alone`, the photos of the demonstrations without

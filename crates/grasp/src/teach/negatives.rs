@@ -2,8 +2,9 @@
 //!
 //! The agreement of a demonstration with other objects depends on the part: a ring agrees with everything round, a
 //! housing with many edges agrees with no other object. It is therefore measured in composed scenes during teaching.
-//! The highest agreement varies more with the seed than between parts, so the mean is used: for the paper's eight parts
-//! it was 0.26 to 0.39 in 60 composed scenes each; in 60 of the simulator's pictures it differed by at most 0.04.
+//! The maximum over the scenes varies more with the seed than between parts, so the mean over the scenes is used: for
+//! the paper's eight parts the mean was 0.26 to 0.39 in 60 composed scenes each; in 60 of the simulator's pictures it
+//! differed by at most 0.04.
 
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
@@ -25,7 +26,8 @@ use crate::verification::{SearchedImage, search};
 /// Minimum number of scenes with any agreement for a mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
 
-/// Scenes without the part, and the part searched in them at the default size tolerance, not the model's.
+/// Scenes without the part, and the demonstrations that are searched in them at the default size tolerance, not the
+/// model's.
 pub(crate) struct NegativeScenes {
     scenes: Vec<Sample>,
     demonstrations: Vec<TaughtDemonstration>,
@@ -52,7 +54,7 @@ impl NegativeScenes {
         Ok(Self { scenes, demonstrations })
     }
 
-    /// The place most similar to the part in each scene, from the network's proposals and from the search.
+    /// The place most similar to the part in each scene, from the network's candidates and from the search.
     ///
     /// # Errors
     /// An image that is invalid for the network.

@@ -11,7 +11,8 @@ use super::preset::{OrientationTeaching, Preset};
 use crate::base_weights::BaseWeights;
 use crate::facts::ModelKind;
 
-/// Minimum fraction of parts at which a useful network places the demonstration. Chosen by hand, not measured.
+/// Minimum fraction of the held-out samples with the part in which a useful network finds the part. Chosen by hand, not
+/// measured.
 const MIN_HIT_RATE: f64 = 0.5;
 
 /// All settings for teaching a model with a network, except the demonstrations and the initial weights.
@@ -29,7 +30,7 @@ pub(crate) struct NetworkTeaching {
     pub(crate) distinct_samples: Option<u64>,
     /// The samples for validation and calibration.
     pub(crate) held_back: AugmentationConfig,
-    /// Minimum fraction of parts at which the network must place the demonstration.
+    /// Minimum fraction of the held-out samples with the part in which the network must find the part.
     pub(crate) min_hit_rate: f64,
     /// Number of generated parts shown during teaching, beside the part and in its place.
     pub(crate) num_other_parts: usize,

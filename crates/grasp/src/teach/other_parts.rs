@@ -40,7 +40,7 @@ const NUM_PICTURES: u64 = 16;
 pub(super) struct OnOtherParts {
     /// The network's highest score in each picture.
     pub(super) highest: Vec<f64>,
-    /// The network's score at the sighting of best agreement in each picture that has one; 0 without a proposal.
+    /// The network's score at the sighting of best agreement in each picture that has one; 0 without a box.
     pub(super) best_agreement: Vec<f64>,
 }
 

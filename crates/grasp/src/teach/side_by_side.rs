@@ -9,7 +9,7 @@ use crate::error::Result;
 /// short to be divided well.
 ///
 /// # Errors
-/// The error of the first input that failed.
+/// The error of one of the inputs that failed.
 pub(super) fn side_by_side<I: Sync, O: Send>(
     inputs: &[I],
     work: impl Fn(&I) -> Result<O> + Sync + Send,

@@ -19,7 +19,7 @@ use crate::model::Verification;
 /// Width and height of the photo, in pixels.
 const PHOTO: [u32; 2] = [192, 144];
 
-/// An L with a bright foot, on a dim ramp.
+/// An L with a bright foot, on a dark background with a brightness gradient.
 pub(crate) fn demonstration() -> Demonstration {
     let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
     let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };

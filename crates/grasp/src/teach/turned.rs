@@ -26,7 +26,7 @@ pub struct TurnedGrasp {
 /// than the marked one.
 ///
 /// # Errors
-/// As for [`GraspModel::detect`].
+/// As for [`GraspModel::detect`], and a further demonstration without a grasp.
 pub fn turned_grasps(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<Vec<TurnedGrasp>> {
     if demonstrations.len() < 2 {
         return Ok(Vec::new());

@@ -12,8 +12,8 @@ use crate::model::{GraspModel, Verification};
 
 /// The demonstrations without the unmarked parts that the model detects in their photos, and the number of these parts.
 ///
-/// The returned photos are used only to make samples, because their other objects may be damaged where a detection is
-/// wrong.
+/// The returned photos are used only to make samples, because a wrong detection may have removed a part of another
+/// object from them.
 ///
 /// # Errors
 /// As for [`GraspModel::detect`].

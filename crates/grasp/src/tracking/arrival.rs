@@ -15,10 +15,10 @@ use super::track::{PastPose, Standing, Track};
 use crate::detection::{Found, Placement};
 use crate::same_part::are_outlines_of_same_part;
 
-/// A pose at this distance from its track's pose is carried forward like the pose of another part, because a capture
+/// A pose farther than this from its track's pose is carried forward like the pose of another part, because a capture
 /// from the track's pose does not reach it. In pixels of the cut-out. Chosen by hand.
 const FAR_PX: f64 = 8.0;
-/// Rotation relative to its track's pose at which a pose counts as distant, in radians. Chosen by hand.
+/// Rotation relative to its track's pose above which a pose also counts as distant, in radians. Chosen by hand.
 const FAR_RAD: f64 = 0.15;
 /// Minimum gain of agreement of a distant pose. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;

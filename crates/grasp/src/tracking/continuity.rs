@@ -33,7 +33,7 @@ impl CoarseView {
         Self { window: *window, cells, means: places.map(|cell| mean(picture, window, cells, cell)).collect() }
     }
 
-    /// Whether the picture has changed outside the boxes and their borders.
+    /// Whether the picture has changed outside the boxes and a border of one cell around each.
     pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
         let PixelRect { left, top, width, height } = self.window;
         let [left, top] = [left, top].map(f64::from);

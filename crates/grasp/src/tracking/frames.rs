@@ -1,4 +1,4 @@
-//! The newest frame, and older frames while a search of one of them runs.
+//! The newest frame, and older frames while one of them is searched or its detections are carried forward.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

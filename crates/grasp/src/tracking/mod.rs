@@ -13,9 +13,9 @@
 //! since. *Carried forward*: a detection in an older frame is followed through the later frames up to the newest.
 //!
 //! A followed track is scored in every frame like a detection ([`crate::Contributions`]), with two differences. A held
-//! track keeps the score of its last search. The close look, which takes the most time, is made only in searches and if
-//! the agreement of edges and surface has changed since the last one, or after a second. A track whose score falls
-//! below [`TrackerConfig::lose_below`] is lost in that frame.
+//! track keeps the score of its last search. The close look, which takes the most time, is made only in searches, and
+//! if the last one is older than a second or the agreement of edges and surface has changed since. A track whose score
+//! falls below [`TrackerConfig::lose_below`] is lost in that frame.
 //!
 //! This module deliberately has no clock and no thread. Frames carry their times, and the owner of the [`Tracker`]
 //! decides where and when searches run. The same code therefore runs on two cores and in a browser, and gives the same

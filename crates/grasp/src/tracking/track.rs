@@ -183,7 +183,7 @@ impl Track {
     }
 
     /// Compares a search's pose with the pose by edges in the searched frame: a small difference corrects the following
-    /// frames, a large one is tried in the next frame.
+    /// frames, a large one is tried in the next frame. Without effect if the search's pose agrees less.
     pub(super) fn correct(&mut self, detector: &PartDetector, past: &PastPose, found: &Placement) {
         let difference = past.by_edges.inverse().compose(&found.image_from_cutout);
         let middle = self.part.demonstration(detector).marks.bbox.center();

@@ -144,9 +144,10 @@ impl Tracker {
         self.parts()
     }
 
-    /// The search to be run before the newest frame is answered, because that frame does not continue the one before:
-    /// it is the first or was taken long after the one before, or a followed part is gone or the picture changed
-    /// elsewhere, without counting as a movement ([`TrackerConfig::moves_within`]). Its result goes to
+    /// The search to be run before the newest frame is answered; `None` if that frame continues the one before. The
+    /// first frame continues nothing. A frame more than [`TrackerConfig::search_every`] after the one before continues
+    /// it only if the pictures are equal. A frame more than [`TrackerConfig::moves_within`] after the one before does
+    /// not continue it if a followed part is gone or the picture changed elsewhere. The search's result goes to
     /// [`Self::answer`]. A running search is abandoned.
     pub fn search_before_answer(&mut self) -> Option<PartSearch> {
         self.gap?;

@@ -1,8 +1,9 @@
 //! A convolution as one matrix product whose left side is read in place.
 //!
 //! Maps are channels last, so that the input of a kernel row at a position is one run of floats, and the next
-//! position's run starts `stride · C` later: rows of the product are positions, its depth is (row of the kernel,
-//! run). If the kernel extends beyond the edges, a unit first copies its rows with zeros around them.
+//! position's run starts `stride · C` later. The rows of the product are positions; its depth runs over the rows of the
+//! kernel and the floats of a run. If the kernel extends beyond the edges, a unit first copies its rows with zeros
+//! around them.
 
 use super::panels::Panels;
 use crate::parallel::{Raw, for_each_unit};

@@ -244,7 +244,8 @@ fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
 
 #[test]
 fn what_follows_is_done_to_every_element() {
-    // Directly in one piece and in windows, and by Winograd's method; backwards with pixels that no cell reaches.
+    // The cases: direct in one piece, direct in windows, Winograd's method, and, backwards, pixels that no cell
+    // reaches.
     let cases = [
         ([2, 16, 9, 10], [48, 1, 1], 1, 0),
         ([1, 3, 9, 10], [37, 3, 3], 2, 1),

@@ -4,8 +4,8 @@
 //!
 //! `y = Aᵀ [(G g Gᵀ) ⊙ (Bᵀ d B)] A`
 //!
-//! so that for each of the 36 *frequencies* the sum over channels is a matrix product of all tiles with all
-//! filters. The weight's gradient is the adjoint: `Gᵀ [Σ_tiles (Bᵀ d B) ⊙ (A ȳ Aᵀ)] G`.
+//! so that for each of the 36 *frequencies* the sum over channels is a matrix product of all tiles with all filters.
+//! With the output's gradient ȳ, the weight's gradient is the adjoint: `Gᵀ [Σ_tiles (Bᵀ d B) ⊙ (A ȳ Aᵀ)] G`.
 //!
 //! The points are 0, ±1/√2, ±√2, ∞: with these the rounding error is several times smaller than with 0, ±1, ±2, ∞.
 //! Values that are not finite would spread over their tile, so that each result is checked; if one of its values is not
@@ -134,7 +134,7 @@ impl Winograd<'_> {
         let mut transformed_input = Frequencies::new(count, channels);
         let mut products = Frequencies::new(count, columns);
         let (input_step, products_step) = (transformed_input.step, products.step);
-        // Parts of the tiles that are transformed separately.
+        // Number of tiles that are transformed together.
         let part = if shared_out { count.div_ceil(MIN_UNITS) } else { count };
         let parts = count.div_ceil(part);
 

@@ -114,8 +114,8 @@ fn roi_align_kernel(
 }
 
 /// The samples of one bin along one axis that may lie on the map: the bin's start and length in feature pixels, the
-/// first sample, the number of samples that follow it, and the number of all samples, on the map and off it. If a
-/// corner is not finite, no samples follow.
+/// first sample, the number of samples from it on, and the number of all samples, on the map and off it. If a corner is
+/// not finite, the number of samples from the first on is 0.
 #[cube]
 fn axis_samples(
     low: f32,

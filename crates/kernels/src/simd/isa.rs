@@ -9,8 +9,8 @@ pub(crate) enum Isa {
     Avx512,
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// NEON, which every aarch64 has, and WebAssembly's, whose presence is fixed when a module is compiled, because a
-    /// running module cannot query it.
+    /// NEON, which every aarch64 has, or the vector instructions of WebAssembly. The presence of the latter is fixed
+    /// when a module is compiled, because a running module cannot query it.
     #[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
     Quads,
     Portable,

@@ -11,8 +11,8 @@ mod vector {
         vsubq_f32, vzip1q_f32, vzip1q_f64, vzip2q_f32, vzip2q_f64,
     };
 
-    /// Of the thirty-two registers, twenty-four hold sums, four the vectors that these have in common, and one a
-    /// factor.
+    /// Of the thirty-two registers, twenty-four hold sums, four the vectors that all rows of a tile have in common, and
+    /// one a factor.
     pub(super) const ROWS: usize = 6;
 
     #[inline(always)]

@@ -167,8 +167,8 @@ fn origin_distance_m(joints: &[DhJoint; NUM_JOINTS], first: usize, second: usize
     let mut distance_m = 0.0;
     let mut at = first;
     while at < second {
-        // If a link's origin lies on the axis of the next joint, and the offset of the following link is perpendicular
-        // to that axis, the distance between the first and the last origin does not depend on the joint's angle.
+        // Two links together: if the first one is offset only along its joint's axis (a = 0) and the second one only
+        // perpendicular to this axis (d = 0), the two offsets are at right angles for every angle of the joint.
         if at + 2 <= second && joints[at].a_m == 0.0 && joints[at + 1].d_m == 0.0 {
             distance_m += step(at + 1).hypot(step(at + 2));
             at += 2;

@@ -2,11 +2,11 @@
 //!
 //! An edge is the straight motion in joint space between two configurations. It is checked by *conservative
 //! advancement*: at a configuration, each pair of bodies has a distance d and an upper bound v of its approach speed
-//! along the edge, from the angles that the joints cover and the bodies' reach. Over the next d / v of the edge, the
-//! pair cannot touch. Steps are therefore long in free space and short near obstacles, and the edge is also proven free
-//! between two checked configurations. The edge is checked at several configurations in parallel, one for each lane:
-//! the lanes start at evenly distributed points of the edge, and each advances to the next lane's start. Curves are
-//! proven in the same way, with the largest rate of each joint along them.
+//! along the edge. The bound follows from the angles that the joints cover and from the bodies' reach. Over the next d
+//! / v of the edge, the pair cannot touch. Steps are therefore long in free space and short near obstacles, and the
+//! edge is also proven free between two checked configurations. The edge is checked at several configurations in
+//! parallel, one for each SIMD lane: the lanes start at evenly distributed points of the edge, and each advances to the
+//! next lane's start. Curves are proven free in the same way, with the largest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::lanes::{Lane, NUM_LANES};
@@ -141,7 +141,8 @@ impl<'a> Checker<'a> {
         // A pair without relative motion gets infinity: any distance is sufficient for the whole edge.
         let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };
         Weights {
-            // Joints before the first body's own joint do not change the distance: they move both bodies together.
+            // The joints up to the first body's own joint do not change the distance, because they move both bodies
+            // together.
             self_pairs: std::array::from_fn(|one| std::array::from_fn(|other| per_metre(speed_m(other, one)))),
             bodies: std::array::from_fn(|body| per_metre(speed_m(body, 0))),
             offset_m: self.margin_m,

@@ -1,5 +1,5 @@
-//! The arm at several configurations in parallel, one for each lane: arrays of one coordinate each, which the compiler
-//! vectorises.
+//! The arm at several configurations in parallel, one for each SIMD lane: arrays of one coordinate each, which the
+//! compiler vectorises.
 //!
 //! The inner loops run over the lanes and avoid branches.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]

@@ -61,7 +61,7 @@ pub struct CollisionModel {
 impl CollisionModel {
     /// The model of an arm among obstacles, with the fingers at an opening (m).
     ///
-    /// The base is not compared with obstacles, because it is fixed to one.
+    /// The base is not compared with obstacles, because it is fixed to an obstacle, such as the table.
     ///
     /// # Errors
     /// [`CollisionError`] for impossible lengths and poses, for duplicate names, and for an opening outside the hand's
@@ -139,7 +139,8 @@ impl CollisionModel {
 
     /// The two closest bodies, with the gradient of their distance.
     ///
-    /// Computed pair by pair and without bounds, which is slow; tests of [`super::Checker`] use it as the reference.
+    /// Computed pair by pair and without bounding spheres, which is slow; tests of [`super::Checker`] use it as the
+    /// reference.
     pub fn nearest(&self, q: &JointVector) -> Proximity {
         let frames = self.geometry.frames(q);
         let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
@@ -159,8 +160,7 @@ impl CollisionModel {
                     let distance_m = (q - p).norm() - a.radius_m - b.radius_m;
                     if distance_m < nearest.distance_m {
                         let normal = (q - p).try_normalize(0.0).unwrap_or_else(nalgebra::Vector3::x);
-                        // The closest points of the surfaces move like those of the axes, because a rotation about an
-                        // axis keeps the radius.
+                        // The distance of the surfaces changes like that of the axes, because the radii are constant.
                         let gradient =
                             moved_along(&frames, other, &q, &normal) - moved_along(&frames, one, &p, &normal);
                         let other_name = Body::of_index(one).to_string();

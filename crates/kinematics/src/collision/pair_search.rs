@@ -34,7 +34,7 @@ impl Placed {
 pub(super) struct Weights {
     pub(super) self_pairs: [[f64; NUM_BODIES]; NUM_BODIES],
     pub(super) bodies: [f64; NUM_BODIES],
-    /// Length that is added to each distance, m.
+    /// Length that is added to each distance before the multiplication, m.
     pub(super) offset_m: f64,
 }
 
@@ -115,7 +115,8 @@ struct Search {
 }
 
 impl Search {
-    /// Whether lower bounds of the distances, `bounds - radius_m`, exclude a smaller weighted distance in every lane.
+    /// Whether lower bounds of the distances, `bounds - radius_m`, exclude in every lane both a smaller weighted
+    /// distance and a distance below the margin.
     #[inline(always)]
     fn can_skip(&self, bounds: &Lane, radius_m: f64, weight: f64) -> bool {
         let mut is_needed = false;
@@ -151,7 +152,7 @@ impl Search {
         weights: &Weights,
         shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
     ) {
-        // From the held part to link 1, because the outer bodies are close to an obstacle most often.
+        // In the order from the held part to link 1, because the outer bodies are close to an obstacle most often.
         for body in (FIRST_MOVING..NUM_BODIES).rev() {
             let capsules = &model.arm.capsules[body];
             if model.may_touch[body][index] || capsules.is_empty() {

@@ -14,7 +14,7 @@ fn a_load_straight_out_weighs_what_its_lever_says() {
     let mut q = JointVector::zeros();
     q[1] = std::f64::consts::FRAC_PI_2;
     let bare = ArmDynamics::new(&ArmGeometry::panda(), 0.08);
-    // Outwards from joint 2: 0.316 + 0.384; 0.088 across; the flange points back to the base, 0.088 m lower.
+    // The wrist is 0.316 m + 0.384 m outwards from joint 2. The flange points back to the base, 0.088 m lower.
     let out_m = 0.3;
     let loaded = bare.clone().with_load(2.0, [0.0, 0.0, -out_m]);
     let difference = loaded.gravity_nm(&q) - bare.gravity_nm(&q);

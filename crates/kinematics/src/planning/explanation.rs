@@ -40,7 +40,7 @@ pub fn plan_parts(model: &CollisionModel, plan: &Plan, motions: &[Trajectory]) -
     parts
 }
 
-/// Number of equal parts of a motion's duration; the arm passes a waypoint at the closest end of a part.
+/// Number of equal parts of a motion's duration; a waypoint counts as passed at the part's end that is closest to it.
 const NUM_SAMPLES: usize = 1000;
 /// Configurations closer together than this are equal, rad.
 const SAME_RAD: f64 = 1e-9;

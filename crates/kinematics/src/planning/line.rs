@@ -56,8 +56,8 @@ pub fn checked_line(
     })
 }
 
-/// Fraction of the followed part of a path that is followed again for the check: at the end of that part, a joint
-/// reaches its limit.
+/// If only a part of a path can be followed, this fraction of the part is followed again for the check, because at the
+/// part's end a joint reaches its limit or the arm a singularity.
 const FOLLOWED_AGAIN: f64 = 0.98;
 
 /// The start of the first blocked piece of a path, as a fraction of the path, and the reason.

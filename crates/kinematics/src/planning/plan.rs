@@ -62,8 +62,9 @@ pub struct StraightApproach<'a> {
 pub struct Plan {
     /// Configurations with start and end, connected by straight lines in joint space except for the corners, rad.
     pub waypoints: Vec<JointVector>,
-    /// The path through the waypoints with rounded corners. Usually one; several, each starting where the previous one
-    /// ends, if no rounding is free at a waypoint and the arm must stop there; none if start and end are the same.
+    /// The path through the waypoints with rounded corners, usually in one piece. It has several pieces, each starting
+    /// where the previous one ends, if a waypoint has no free rounding and the arm must stop there. It is empty if
+    /// start and end are the same.
     pub ways: Vec<RoundedPath>,
     /// The straight approach, if one was requested.
     pub approach: Option<JointPath>,
@@ -124,7 +125,7 @@ impl ArmGeometry {
     ///
     /// All poses of `goals` (rotations of a symmetric part, exchanged fingers) are tried with every branch of the arm
     /// and many angles of joint 7. The result is the fastest straight motion to one of them, or else the cheapest path
-    /// found by [`PlanOptions::num_searches`] searches towards all of them. With an approach, the path ends where the
+    /// found by at most [`PlanOptions::num_searches`] searches towards them. With an approach, the path ends where the
     /// approach starts, at a configuration from which the whole approach is free.
     ///
     /// # Units and frames
@@ -199,7 +200,7 @@ impl ArmGeometry {
         let is_straight = first.waypoints.len() == 2;
         let mut best = first;
         shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
-        // A further search may take a few times as long as the first, because it searches for a better path.
+        // A further search may need more checks than the first one, because it searches for a better path.
         growth.step_rad = growth.step_rad.min(FURTHER_STEP_RAD);
         growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
         for _ in 1..if is_straight { 1 } else { options.num_searches } {

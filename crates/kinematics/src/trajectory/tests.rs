@@ -52,7 +52,7 @@ fn assert_rests_at_both_ends(trajectory: &Trajectory) {
 
 #[test]
 fn one_joint_alone_takes_the_time_of_the_textbook() {
-    // Joint 1: v 2.175, a 15, j 7500, distance 2: 2/v + v/a + a/j.
+    // Joint 1, in rad and s: v 2.175, a 15, j 7500, distance 2; duration 2/v + v/a + a/j.
     let start = ready_pose();
     let mut end = start;
     end[0] = 2.0;

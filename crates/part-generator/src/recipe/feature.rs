@@ -38,7 +38,7 @@ pub(crate) struct Edge {
     pub width: f32,
     /// Height difference.
     pub drop: f32,
-    /// Round, or a straight chamfer.
+    /// Whether the profile is round; otherwise it is a straight chamfer.
     pub round: bool,
 }
 

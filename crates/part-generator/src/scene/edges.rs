@@ -32,8 +32,9 @@ fn is_like(a: &Contact, b: &Contact, step: f32) -> bool {
     (a.z - b.z).abs() <= step && a.texel.material == b.texel.material && a.is_on_wall() == b.is_on_wall()
 }
 
-/// Renders pixels on edges again: each sample's contact is computed, and its light is that of a neighbouring pixel that
-/// shows the same piece, if there is one.
+/// Renders pixels on edges again. Between bodies, or between a body and the table, the contact of each sample is
+/// computed; the light of the sample is that of a neighbouring pixel that shows the same piece, if there is one. Pixels
+/// on an edge within one body get a mean of their neighbourhood.
 pub(crate) fn smooth_edges(
     scene: &Scene,
     seen: &Seen,

@@ -95,7 +95,7 @@ impl Lighting {
         Self { lamps, ambient, gradient, maps }
     }
 
-    /// Light reflected from a direction by a surface of this roughness: the mean over its lobe.
+    /// Light reflected from a direction by a surface with the reflection map `level`: the mean over the surface's lobe.
     #[inline(always)]
     pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 4] {
         let half = 0.5 * SIDE as f32;

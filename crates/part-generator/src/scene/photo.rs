@@ -19,8 +19,8 @@ use crate::random::{Draw, Stream, generator};
 /// Focal length divided by the picture's width: that of the project's wrist camera.
 pub(crate) const FOCAL_OVER_WIDTH: f32 = 0.86;
 
-/// Sufficient difference between table and part (sum over channels of square roots of linear values). If a table has
-/// less, one with more contrast replaces it.
+/// Sufficient contrast of table and part: the sum over channels of the differences between square roots of linear
+/// values. A table with less contrast is replaced by one with more.
 const MIN_CONTRAST: f32 = 0.5;
 
 /// Settings of the photo.

@@ -210,7 +210,7 @@ impl Placement {
         }
         let slant = (drift[0] * drift[0] + drift[1] * drift[1]).sqrt();
         if slant * (high - low) < 2.0 * BLOCK_CELLS as f32 {
-            // The whole segment is within a block around its middle.
+            // The whole segment is within `BLOCK_CELLS` of its middle.
             let middle = 0.5 * (high + low);
             let (gx, gy) = (start[0] + drift[0] * middle, start[1] + drift[1] * middle);
             high = high.min(level.top_around(gx, gy) as f32 * relief.step);
@@ -263,7 +263,7 @@ impl Placement {
 mod tests {
     use super::*;
 
-    /// Whether small steps along a line of sight in the grid reach below the part's upper side.
+    /// Whether one of many small steps along a line of sight in the grid ends inside the part.
     fn is_met_in_small_steps(body: &Placement, sight: &Sight) -> bool {
         let (relief, level) = (&body.part.relief, body.level());
         (0..=400).any(|k| {

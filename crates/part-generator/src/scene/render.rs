@@ -24,7 +24,7 @@ pub(crate) struct Footprint {
 pub(crate) struct Rendered {
     /// The body at each pixel's centre.
     pub ids: Vec<u8>,
-    /// The pixels of the first bodies.
+    /// The pixels of the bodies for which footprints were requested: the first ones.
     pub footprints: Vec<Footprint>,
 }
 

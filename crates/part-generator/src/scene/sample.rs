@@ -12,7 +12,7 @@ use crate::{LookAlike, PartKind};
 pub struct Instance {
     /// The marks, in pixels of the picture.
     pub grasp: GraspLine,
-    /// The marks in the frame of [`Sample::camera`], in metres.
+    /// The marks in the frame on the table in which [`Sample::camera`] is posed, in metres.
     pub marks_m: [Point3<f64>; 2],
     /// Width of the part between the jaws, in pixels.
     pub jaw_width_px: f64,
@@ -57,7 +57,7 @@ pub enum OtherKind {
 pub struct OtherObject {
     /// Kind of the object.
     pub kind: OtherKind,
-    /// Bounding box, in pixels; may extend outside the picture.
+    /// A box, in pixels, that contains the object, not always tightly; may extend outside the picture.
     pub bbox: BoundingBox,
 }
 

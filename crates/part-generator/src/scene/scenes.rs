@@ -100,7 +100,7 @@ impl Scenes {
         &self.subjects[part_idx].part
     }
 
-    /// The look-alikes of a part.
+    /// The look-alikes of a part; none if the configuration's `look_alike_share` is 0.
     pub fn look_alikes(&self, part_idx: usize) -> impl Iterator<Item = (LookAlike, &Part)> {
         self.subjects[part_idx].look_alikes.iter().map(|(kind, part)| (*kind, part.as_ref()))
     }

@@ -129,7 +129,7 @@ impl Table {
         if rng.chance(SHEETS_PROBABILITY) {
             made.sheets = (0..rng.whole(1, 2)).map(|_| Sheet::draw(rng)).collect();
         }
-        // Dirt, wear and grain on all tables.
+        // Grain on all these tables; stains and spots on some.
         let stains = rng.uniform(0.0, 0.09);
         let scale = rng.log_uniform(0.25, 1.2);
         if stains > 0.03 {

@@ -110,7 +110,7 @@ impl View {
         self.row(py).at(px)
     }
 
-    /// The projection of a point; `None` less than 1 mm in front of the camera.
+    /// The projection of a point; `None` if the point is not more than 1 mm in front of the camera.
     pub fn project(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         let d = [p[0] - self.position[0], p[1] - self.position[1], p[2] - self.position[2]];
         let along = |axis: &[f32; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];

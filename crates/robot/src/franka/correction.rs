@@ -11,8 +11,8 @@ use crate::arm_state::PERIOD_SECS;
 /// corrections double this duration up to [`MAX_DOUBLINGS`] times.
 const SHORTEST_SECS: f64 = 0.2;
 const MAX_DOUBLINGS: i32 = 2;
-/// Largest fraction of the acceleration and jerk limits that a correction uses, in addition to the trajectory (a free
-/// motion uses at most 0.4 and 0.2 of them).
+/// Largest fraction of the acceleration and jerk limits that a correction uses, unless even the longest correction
+/// needs more. The trajectory itself uses at most 0.4 of the acceleration and 0.2 of the jerk limits on free motions.
 const SHARE: f64 = 0.3;
 /// Number of equal steps in which a correction is compared with the limits.
 const NUM_SAMPLES: u32 = 20;

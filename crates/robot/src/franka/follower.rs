@@ -40,7 +40,8 @@ const MAX_CYCLES_AFTER_END: u32 = 2000;
 pub(super) enum Next {
     /// Joint positions, rad.
     Position(JointVector),
-    /// The last positions: the robot's reference is at rest there.
+    /// The last positions: the robot's reference is at rest at the end, or has not arrived within
+    /// [`MAX_CYCLES_AFTER_END`].
     Last(JointVector),
 }
 

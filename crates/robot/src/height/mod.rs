@@ -4,9 +4,9 @@
 //! Sighting, Sighting ─ triangulate ─ MeasuredHeight ─┐
 //! --mark-height-mm ─ GivenHeight ─────────────────────┴─ settle ─ the more certain of both; an error if they contradict each other
 //! ```
-//! **Frames.** All heights are z of the plane of the marks, in the robot's base frame. A picture shows a part in an
-//! assumed plane; for another plane, position, size and jaw width of the part scale about the point vertically below
-//! the camera.
+//! **Frames.** Unless stated otherwise, a height is z of the plane of the marks in the robot's base frame. A picture
+//! shows a part in an assumed plane; for another plane, position, size and jaw width of the part scale about the point
+//! vertically below the camera.
 //!
 //! `sequence/measure.rs` moves the camera and takes the pictures.
 

@@ -4,15 +4,16 @@
 //! height = where the lines of sight come nearest     sigma² = (places' sigmas / difference of the slopes)² + relief²
 //! ```
 //! A slope is the sideways distance of a line of sight per metre downwards: the slopes from two camera positions 0.12 m
-//! apart and 0.27 m above the part differ by 0.44. The relief cannot be measured in a picture: walls, feet and rims
-//! also produce edges, so that a part appears slightly above or below its marks, by the same distance each time.
+//! apart and 0.27 m above the part differ by 0.44. The relief is the height of the visible edges above the marks. It
+//! cannot be measured in a picture: walls, feet and rims also produce edges, so that a part appears slightly above or
+//! below its marks, by the same distance each time.
 //!
 //! The sizes in both pictures are used only to match several parts between the pictures, because the errors of a height
 //! from sizes are larger (docs/robot-evidence.md).
 
 use super::sighting::Sighting;
 
-/// Minimum sideways distance of the camera, m.
+/// Minimum sideways distance between the two camera positions, m.
 pub const MIN_BASELINE_M: f64 = 0.080;
 /// Minimum difference of the slopes of two lines of sight; with less they count as parallel. The value corresponds to
 /// 80 mm at 0.8 m.
@@ -28,7 +29,7 @@ const MIN_DISTANCE_M: f64 = 0.05;
 /// the lines of sight place 3.2 mm below to 3.9 mm above their marks (`heights raw 4 101`).
 pub const RELIEF_M: f64 = 2.3e-3;
 
-/// The height of a part's marks, z of the base frame.
+/// A measured height, z of the base frame: of a part's marks, or of the surface beside the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredHeight {
     /// Height, m.

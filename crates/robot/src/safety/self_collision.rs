@@ -1,7 +1,7 @@
 //! Minimum distance between the arm's own bodies.
 //!
-//! The capsules of a link contain all its shapes, so that links whose capsules do not touch do not touch either. The
-//! capsules are fewer and wider than those of [`sdg_kinematics::collision`].
+//! The capsules of a link contain all its shapes: two links can touch only if their capsules do. The capsules are fewer
+//! and wider than those of [`sdg_kinematics::collision`].
 
 use std::fmt;
 

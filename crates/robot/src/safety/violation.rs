@@ -45,7 +45,7 @@ pub enum Violation {
         quantity: &'static str,
         found: f64,
         max: f64,
-        /// Unit of the values: m or rad, or a derivative of them.
+        /// Unit of the values, such as m/s or rad/s².
         unit: &'static str,
     },
     /// The hand leaves the workspace.

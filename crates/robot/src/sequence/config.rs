@@ -78,7 +78,7 @@ pub struct GraspConfig {
 }
 
 impl Default for GraspConfig {
-    /// The paper's sequence, as rehearsals run it.
+    /// The sequence of the paper *SingleDemoGrasp*, as rehearsals run it.
     fn default() -> Self {
         let look_outs = [0.0, 0.10, -0.10].map(|shift_m| LookOut::CameraAt {
             at_m: [LOOK_AT_M[0], LOOK_AT_M[1] + shift_m],
@@ -135,9 +135,9 @@ impl LookOut {
     }
 }
 
-/// The pose of a camera at (x, y, `height_m`) in the base frame that points straight down. At yaw 0 the picture's up
-/// direction is the base's x and its right direction is -y; a positive yaw rotates the camera counter-clockwise as seen
-/// from above.
+/// The pose of a camera that points straight down from (`x`, `y`, `height_m`), m in the base frame. At yaw 0 the
+/// picture's up direction is the base's x and its right direction is -y; a positive yaw rotates the camera
+/// counter-clockwise as seen from above.
 pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
     let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);

@@ -16,7 +16,7 @@ use crate::perception::GraspStep;
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
-/// Steps by which a lift is shortened if the arm cannot reach so far, m.
+/// Steps by which a lift is shortened if the arm cannot reach the end of the lift, m.
 const LIFT_STEP_M: f64 = 0.05;
 /// Minimum distance from the obstacles of the cell on straight motions, m.
 const LINE_MARGIN_M: f64 = 0.003;
@@ -45,7 +45,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach so far.
+    /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach that height.
     pub(super) fn lift(&mut self) -> Steps<()> {
         self.begin(GraspStep::Lift)?;
         let start = self.robot.commanded()?;

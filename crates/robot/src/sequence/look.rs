@@ -13,9 +13,10 @@ use crate::surroundings::Destination;
 
 /// Camera positions above the part: small shifts that keep it near the centre of the picture, m.
 pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
-/// Score threshold of perception.
+/// Minimum score of an accepted detection.
 pub const SURE: f64 = 0.5;
-/// Score threshold of a detection that confirms the first one, that is, within [`CONFIRMING_TOLERANCE`] (m, rad) of it.
+/// Minimum score of a detection that confirms the first one. The confirming detection must also be within
+/// [`CONFIRMING_TOLERANCE`] (m, rad) of the first one.
 pub const MIN_CONFIRMING_SCORE: f64 = 0.2;
 const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
 

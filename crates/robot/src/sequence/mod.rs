@@ -1,4 +1,4 @@
-//! One grasp: the paper's sequence, for every arm.
+//! One grasp by the sequence of the paper *SingleDemoGrasp*, for every arm.
 //!
 //! ```text
 //! look ─> find ─> hover, rotated ─> find ─> above ─> straight down ─> close ─> lift ─> hold
@@ -70,8 +70,8 @@ pub enum GraspOutcome {
 pub struct GraspReport {
     /// The outcome.
     pub outcome: GraspOutcome,
-    /// The accepted detection of each picture that `looks` counts; last, the target at the part's height, if this
-    /// height was determined.
+    /// The accepted detection of each picture that `looks` counts, `None` without one; after them the target at the
+    /// part's height, if this height was determined.
     pub targets: Vec<Option<GraspTarget>>,
     /// Numbers of pictures: from look-out poses, and from above the first detection.
     pub looks: [usize; 2],
@@ -137,7 +137,7 @@ impl From<RobotError> for Stop {
 
 type Steps<T> = std::result::Result<T, Stop>;
 
-/// Planning and safety errors fail the step; others abort.
+/// A motion that cannot be planned, violates a limit or is blocked fails the step; other errors end the sequence.
 fn fails_at<T>(step: GraspStep, result: Result<T>) -> Steps<T> {
     result.map_err(|error| match error {
         RobotError::Planning(error) => Stop::Failed(step, error.to_string()),
@@ -260,7 +260,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         self.take(&target)
     }
 
-    /// Grasps and lifts a found part, starting above it.
+    /// Moves above a found part, grasps it, lifts it and holds it.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;

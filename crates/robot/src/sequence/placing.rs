@@ -1,4 +1,5 @@
-//! Puts the held part down until a contact is measured, not to a given height, and checks its position with a picture.
+//! Lowers the held part until a contact is measured, not to a given height, and checks the part's position with a
+//! picture.
 //!
 //! ```text
 //! held ─> carry ─> straight down, compliant at the end, until contact ─> open, up ─> look ─> within the limits
@@ -33,7 +34,7 @@ use crate::touch::{TouchDown, Touched};
 const RELEASING_SPEED_M_S: f64 = 0.05;
 /// Time that the arm stands still after the fingers have opened, s.
 const RELEASED_SECS: f64 = 0.2;
-/// Steps by which the ascent is shortened if the arm cannot reach so far, m.
+/// Steps by which the ascent is shortened if the arm cannot reach the end of the ascent, m.
 const RETREAT_STEP_M: f64 = 0.05;
 
 /// Settings for putting a held part down.
@@ -47,11 +48,11 @@ pub struct PlacingConfig {
     pub release_margin_m: f64,
     /// Height of the ascent after the release, m.
     pub retreat_m: f64,
-    /// Largest offset of the part from its place, m.
+    /// Largest allowed offset of the part from its place, m.
     pub tolerance_m: f64,
-    /// Largest angle between the part and its goal, rad.
+    /// Largest allowed angle between the part and its goal, rad.
     pub tolerance_rad: f64,
-    /// A part with a larger offset, m, or angle, rad, is grasped again. The limits are below the tolerances, because
+    /// A part with a larger offset (m) or angle (rad) is grasped again. These limits are below the tolerances, because
     /// the measurement by a picture is not exact.
     pub aim: (f64, f64),
     /// Maximum number of repeated grasps.
@@ -101,10 +102,10 @@ pub struct PlacingReport {
     pub errors: Vec<PlaceOffset>,
 }
 
-/// Grasps the part and puts it down; repeats this if its offset is too large, see [`PlacingConfig::max_corrections`]. A
-/// cell of a tray must have room for the part and for the fingers that release it, with parts assumed in all
-/// neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is given, otherwise after the
-/// part was found.
+/// Grasps the part and puts it down; repeats both if the part's offset is too large, see
+/// [`PlacingConfig::max_corrections`]. A cell of a tray must have room for the part and for the fingers that release
+/// it, with parts assumed in all neighbouring cells. This is checked before anything moves if [`GraspConfig::part`] is
+/// given, otherwise after the part was found.
 ///
 /// # Errors
 /// As for [`super::grasp`]; [`crate::RobotError::Configuration`] if [`GraspConfig::part`] has no room, or for
@@ -145,8 +146,8 @@ impl PlacingOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Fails if the place has no room for the part or already contains a part. Adds the parts that may lie around the
-    /// place as obstacles.
+    /// Fails if the place has no room for the part or, unless it is a bin, already contains a part. Adds the parts that
+    /// may lie around the place as obstacles.
     fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
         let table_height_m = self.surface_height_m();
         let Some(part) = shape_of(target, table_height_m, self.cell.config) else { return Ok(()) };
@@ -214,12 +215,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
-            // The hand keeps the orientation in which it released the part, because there its fingers had room.
+            // The hand keeps the orientation in which it released the part, because the fingers had room in that
+            // orientation.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z = match self.cell.config.height {
-                // Heights are measured: the height of the place is given, and that of the part was measured before its
-                // grasp.
+                // If heights are measured, the place's height is given, and the part's height was measured before its
+                // first grasp.
                 Some(_) => aim.base_from_part.translation.z,
                 // Perception assumes that the part lies on the table.
                 None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,

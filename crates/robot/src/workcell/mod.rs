@@ -57,7 +57,8 @@
 //! at_mm = [450, -300]               # its centre
 //! size_mm = [200, 150]              # inner size, along its x and its y
 //! ```
-//! Every [`WorkcellError`] contains the line. This crate reads no files: it converts a text to a [`Workcell`].
+//! Every [`WorkcellError`] contains the number of the line. This crate reads no files: it converts a text to a
+//! [`Workcell`].
 
 mod error;
 mod file;

@@ -1,4 +1,4 @@
-//! The text of a workcell file, for converting positions to line numbers, and readers for repeated kinds of values.
+//! The text of a workcell file: converts positions to line numbers, and reads numbers and ranges.
 
 use serde::Deserialize;
 use toml::Spanned;

@@ -2,9 +2,10 @@
 //!
 //! The first request of a writer may be lost. A Cyclone reader that has just matched the writer asks for the writer's
 //! state once per second, until the writer has sent a sample. If RustDDS receives such a question while it sends its
-//! first sample, it answers before sending, with a heartbeat that already counts the sample, and the reader treats the
-//! sample as an old one. Later requests are not affected. Therefore a cancellation and a result request are repeated if
-//! no answer arrives. A goal is repeated only after the server has reported that it does not know the goal.
+//! first sample, its answer is sent before the sample. The answer is a heartbeat that already counts the sample, so the
+//! reader treats the sample as an old one. Later requests are not affected. Therefore a cancellation and a result
+//! request are repeated if no answer arrives. A goal is repeated only after the server has reported that it does not
+//! know the goal.
 
 use std::pin::pin;
 use std::time::{Duration, Instant};

@@ -6,18 +6,19 @@ use ros2_client::builtin_interfaces::Time;
 use ros2_client::dds::rustdds::serialization::{deserialize_from_cdr_with_rep_id, to_writer_with_rep_id};
 use ros2_client::dds::rustdds::{RepresentationIdentifier, serialization};
 
-/// The id and the stamp of a request. `ros2-client` keeps this field private, but its bytes are those of the request.
+/// The id and the stamp of a request. `ros2-client` keeps the request's only field, which contains both, private, but
+/// the request has the same bytes.
 ///
 /// # Errors
-/// None for a request that was received; the type does not show this.
+/// Errors of the serialization, which a received request does not cause.
 pub(super) fn named_in(request: &CancelGoalRequest) -> serialization::Result<GoalInfo> {
     let mut bytes = Vec::new();
     to_writer_with_rep_id(&mut bytes, request, RepresentationIdentifier::CDR_LE)?;
     Ok(deserialize_from_cdr_with_rep_id(&bytes, RepresentationIdentifier::CDR_LE)?.0)
 }
 
-/// The answer to a request with an id and a stamp, 0 if not given. An id names one goal, and a stamp the goals accepted
-/// at or before it; without both, all goals are named. `running` is cancelled if it is named.
+/// The answer to a request with an id and a stamp, each 0 if not given. An id names one goal, and a stamp the goals
+/// accepted at or before it; if neither is given, all goals are named. `running` is cancelled if it is named.
 pub(super) fn answer(named: &GoalInfo, running: Option<&GoalInfo>, ended: &[GoalId]) -> CancelGoalResponse {
     let has_stamp = named.stamp != Time::ZERO;
     let has_id = named.goal_id != GoalId::ZERO;

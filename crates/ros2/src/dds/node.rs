@@ -23,7 +23,8 @@ use crate::error::RosError;
 use crate::messages::Message;
 use crate::names::Naming;
 
-/// The middleware whose form of services is used: ROS 2's two usual middlewares differ in services, but not in topics.
+/// The middleware whose form of services is used. ROS 2's two usual middlewares send services in different forms, but
+/// topics in the same form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rmw {
     /// `rmw_fastrtps_cpp`, ROS 2's default.
@@ -61,11 +62,11 @@ pub(super) const MAX_DOMAIN: u16 = 232;
 const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 
 /// Interval after which `wait_for_service` is called again. The function checks the matches when it is called and then
-/// waits for events, of which `ros2-client` keeps eight and drops the rest: if the endpoints of two actions are matched
+/// waits for events. `ros2-client` keeps eight events and drops the rest: if the endpoints of two actions are matched
 /// within a millisecond, the last event may be dropped.
 const MATCH_AGAIN: Duration = Duration::from_millis(100);
-/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore the writer's messages before the
-/// answer; see action.rs.
+/// Wait after a match: Cyclone's readers ask a new writer for its state, and ignore the writer's messages until the
+/// answer arrives; see action.rs.
 const SETTLE: Duration = Duration::from_millis(200);
 
 /// The settings of a node before it joins.
@@ -103,7 +104,7 @@ impl Node {
     /// Joins the network.
     ///
     /// # Errors
-    /// [`RosError`] for an invalid domain or name, and without a socket.
+    /// [`RosError`] for an invalid domain or name, or if no socket can be opened.
     pub fn join(config: NodeConfig) -> Result<Self, RosError> {
         let NodeConfig { naming, domain_id, rmw, is_loopback_only, parameters } = config;
         if domain_id > MAX_DOMAIN {

@@ -35,7 +35,7 @@ impl Qos {
     pub const SERVICES: Self = Self::RESULTS;
     /// Settings for `/tf`.
     pub const TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: false, depth: 100 };
-    /// Settings for `/tf_static`: late subscribers also get the messages.
+    /// Settings for `/tf_static`: late subscribers also get earlier messages.
     pub const STATIC_TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: true, depth: 100 };
     /// Settings for the statuses of actions.
     pub(super) const STATUSES: Self = Self { is_reliable: true, is_transient_local: true, depth: 1 };
@@ -53,10 +53,10 @@ impl Qos {
     }
 }
 
-/// Maximum number of senders whose last message numbers are stored.
+/// Maximum number of senders for which the number of the last message is stored.
 const MAX_SENDERS: usize = 64;
 
-/// A topic's messages.
+/// Receives a topic's messages.
 pub struct Subscription<T: Cdr + 'static> {
     topic: String,
     inner: ros2_client::Subscription<Wire<T>>,

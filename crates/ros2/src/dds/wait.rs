@@ -8,8 +8,8 @@ use std::task::{Context, Poll, Wake, Waker};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
-/// Interval after which a future is polled again without being woken, because `ros2-client` drops events from a full
-/// channel.
+/// Interval after which a future is polled again even if it was not woken, because `ros2-client` drops events when its
+/// channel is full.
 const POLL_EVERY: Duration = Duration::from_millis(100);
 
 /// Whether the future was woken, and the thread to unpark. The thread's own token is not sufficient: code that the

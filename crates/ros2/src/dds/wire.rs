@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::cdr::{self, Cdr, CdrError};
 use crate::encoding::MAX_BYTES;
 
-/// Maximum size of a message: a picture and its other fields.
+/// Maximum size of a message: a picture and the message's other fields.
 const MAX_MESSAGE_BYTES: usize = MAX_BYTES + (1 << 16);
 
 /// A message in transfer. An unreadable message is kept as an error, so that a service can still answer it.

@@ -1,6 +1,6 @@
-"""Plays an arm's driver over Cyclone DDS: FollowJointTrajectory, GripperCommand and joint_states, each endpoint of the actions.
+"""Plays an arm's driver over Cyclone DDS: all endpoints of FollowJointTrajectory and GripperCommand, and joint_states.
 
-python arm_peer.py PROGRAM: the built example arm_against_peer, whose lines are compared with what the peer did.
+python arm_peer.py PROGRAM: the built example arm_against_peer, whose lines are compared with the expected ones.
 """
 
 import subprocess
@@ -40,7 +40,7 @@ class Action:
         self.status((1).to_bytes(4, "little") + goal + bytes(8) + bytes([status]))
 
     def end(self, goal, status, result):
-        """The status is one byte, and the result is aligned after it: it begins with padding."""
+        """Ends a goal. The status is one byte, so `result` begins with padding for its alignment."""
         self.tell(goal, status)
         self.ended[goal] = bytes([status]) + result
         self.serve()
@@ -120,7 +120,7 @@ def main(program):
             elif goals == 2:
                 arm.end(goal, ABORTED, result(-4, "joint 7 was held"))
             elif goals == 4:
-                # Without a cancellation the goal succeeds, which the client's line then states.
+                # Without a cancellation, the goal succeeds, and the client's line shows this.
                 arm.end(goal, SUCCEEDED if play(goal, wanted.trajectory, True) else CANCELED, result(0, ""))
         for head, content in hand.goals.requests():
             goal, wanted = content[:16], unpack(content[16:], "control_msgs/msg/GripperCommandGoal")

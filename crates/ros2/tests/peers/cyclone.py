@@ -1,4 +1,5 @@
-"""Topics and services of ROS 2 over Cyclone DDS, with rosbags' bytes, as a ROS node of another vendor sends and receives them."""
+"""Topics and services of ROS 2 over Cyclone DDS, encoded by rosbags: a peer that is independent of this project's
+code."""
 
 import dataclasses
 import os
@@ -154,7 +155,7 @@ class Client:
         return self.number
 
     def call(self, content, timeout=10.0):
-        """The answer's bytes and the seconds until it arrived; None without an answer."""
+        """The answer's bytes (None without an answer) and the seconds of waiting."""
         number, begun = self.send(content), time.monotonic()
         while time.monotonic() < begun + timeout:
             for sample in self.reader.take(100):
@@ -165,7 +166,7 @@ class Client:
 
 
 class Server:
-    """A service's server, for the action's three services."""
+    """A service's server, for the three services of an action."""
 
     def __init__(self, participant, service, package, name, kind):
         self.request = raw_type(f"{package}::{kind}::dds_::{name}_Request_")

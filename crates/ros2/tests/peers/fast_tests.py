@@ -1,4 +1,4 @@
-"""sdg ros2 against Fast DDS on loopback, by the C++ peer beside this file.
+"""Tests sdg ros2 against Fast DDS on loopback, with the C++ peer beside this file.
 
 python fast_tests.py SDG FOLDER PEER
 """

@@ -1,4 +1,4 @@
-"""Grasps over ROS 2 in a cell of MuJoCo (example ros2_cell), compared with the same attempts in one process.
+"""Grasps over ROS 2 in a cell simulated by MuJoCo (example ros2_cell), compared with the same attempts in one process.
 
 python grasp_tests.py SDG FOLDER CELL ATTEMPTS [PART ...]
 python grasp_tests.py call DOMAIN: calls /sdg/grasp once.
@@ -28,7 +28,8 @@ def grasp(peer, timeout=180.0):
 
 
 def over_ros(sdg, cell, model, part, seed, domain):
-    """Whether the answer says held, whether the part was lifted in the cell, and the text of the answer."""
+    """Whether the answer says that the part is held, whether the part was lifted in the cell, and the text of the
+    answer."""
     simulated = subprocess.Popen([cell, part, str(seed), str(domain), "cyclonedds"], stdout=subprocess.PIPE, text=True)
     said = []
     reader = threading.Thread(target=lambda: said.extend(simulated.stdout), daemon=True)

@@ -1,4 +1,4 @@
-"""Messages with random values: compares the bytes of rosbags with ours, for every type that the node exchanges.
+"""Messages with random values: compares the bytes of rosbags with ours, for the types that `main` lists.
 
 python message_bytes.py PROGRAM: the built example cdr_round_trip.
 """
@@ -47,7 +47,7 @@ DEFINITIONS = {
 
 
 def definitions():
-    """The types above, and the requests and responses of this project's services, from the files that a user builds."""
+    """The types above, and the requests and responses of this project's services, from their .srv files."""
     all_of_them = dict(DEFINITIONS)
     for name in ("Detect", "Teach", "Grasp"):
         request, response = (INTERFACES / f"{name}.srv").read_text().split("---\n")

@@ -1,6 +1,6 @@
-"""sdg ros2 against Cyclone DDS on loopback: pictures, poses, services, faults, latency, memory.
+"""Tests sdg ros2 against Cyclone DDS on loopback: pictures, poses, services, faults, latency, memory.
 
-python node_tests.py SDG FOLDER [pictures|services|faults|latency|memory ...]: FOLDER is for models.
+python node_tests.py SDG FOLDER [pictures|services|faults|latency|memory ...]: FOLDER receives the taught models.
 """
 
 import gc
@@ -94,7 +94,8 @@ def nanos(stamp):
 
 
 def send_at(writer, pixels, rate, count, varied=True):
-    """Sends pictures at a rate and returns their stamps. Each differs in a pixel, as with a sensor's noise."""
+    """Sends pictures at a rate and returns their stamps. If `varied`, they differ in their last byte, as with a
+    sensor's noise."""
     packed = bytearray(pack(image(pixels), "sensor_msgs/msg/Image"))
     stamps, begun = [], time.monotonic()
     for number in range(count):
@@ -124,8 +125,9 @@ def pictures(sdg, folder):
         ("best effort", 30, best_effort(10), []),
     ]:
         pictures_at(sdg, model, best, kind, rate, qos, option)
-        # The participant must leave before the next one joins: of two in one process whose first left, the node did not find the
-        # second's readers in 5 of 25 attempts. Between two processes this happened in none of 30.
+        # The participant must leave before the next one joins. With two participants in one process, of which the first
+        # left, the node did not find the second's readers in 5 of 25 attempts; with one in each of two processes, in
+        # none of 30.
         gc.collect()
 
 
@@ -173,7 +175,8 @@ def pictures_at(sdg, model, best, kind, rate, qos, option):
               and abs(first.results[0].hypothesis.score - best["score"]) < 0.02
               and first.results[0].hypothesis.class_id == "pendulum", "a detection is that of sdg detect")
         pose = poses()[0]
-        # The camera looks straight down from (0.48, 0, 0.58), its x along the base's -y: datasets/workcell/camera.yaml.
+        # The camera looks straight down from (0.48, 0, 0.58) m; its x axis points along the base's -y:
+        # datasets/workcell/camera.yaml.
         p, (x, y, z) = pose.pose.position, best["pose"]["p_m"]
         in_base = (0.48 - p.y, -p.x, 0.58 - p.z)
         apart = max(abs(a - b) for a, b in zip(in_base, (x, y, z)))
@@ -359,7 +362,7 @@ def latency(sdg, folder):
 
 
 def memory(sdg, folder, count=10_000):
-    """Uses small pictures without a part, so that 10^4 take minutes; the messages are still complete."""
+    """Uses pictures of noise, without a part, at 40 Hz, so that 10^4 pictures take minutes."""
     model = teach(sdg, folder)
     domain = 46
     with Sdg(sdg, domain, f"--grasp-model={model}", "--reliable") as node:

@@ -12,11 +12,13 @@ use crate::frame::Frame;
 const PART_SIDE: f64 = 96.0;
 /// Side of the frame, in pixels; the pixels around the part show its surroundings.
 pub(super) const SIDE: usize = 120;
-/// Minimum depth of a cell that shows the part: the distance of the cell inside the outline, in pixels of the frame.
+/// Minimum depth of a cell (a square of [`CELL`] × [`CELL`] pixels) that shows the part. The depth is the distance from
+/// the outline, in pixels of the frame, and is negative outside.
 const INSIDE: f32 = 2.5;
-/// Depths of the cells that show the part's surroundings; below 0 outside the outline.
+/// Depths of the cells that show the part's surroundings.
 const AROUND: std::ops::Range<f32> = -12.0..-3.0;
-/// A cell shows the table if its colour lies within this many spreads of one of the table's colours.
+/// A cell shows the table if its colour lies within this many spreads (standard deviations) of one of the table's
+/// colours.
 const TABLE_SPREADS: f32 = 2.0;
 /// A cell of the part's surroundings counts for one of the picture's frequent colours if the cell's colour lies within
 /// this many spreads of it.
@@ -26,8 +28,8 @@ const TABLE_SHARE: f32 = 0.12;
 /// A cell does not show the part if picture and expected colour differ by more than this: root mean square over the
 /// channels, in units of [`lab`].
 const OTHER_COLOR: f32 = 10.0;
-/// A window counts if the energy of the photo's edges in it exceeds this share of the strongest window's; that energy
-/// is its weight.
+/// A window (3 × 3 cells) counts if the energy of the photo's edges in it exceeds this share of the strongest window's;
+/// that energy is its weight.
 pub(super) const MIN_EDGES: f32 = 0.02;
 /// Minimum depth of a window that still shows the outline's edge.
 const NEAR: f32 = -6.0;
@@ -161,7 +163,8 @@ impl CloseUp {
                 else {
                     return false;
                 };
-                // A shift of one cell is allowed: walls and holes of a part with height are displaced by parallax.
+                // A shift of one cell is allowed, because parallax displaces the walls and holes of a part that is not
+                // flat.
                 let near = [-1, 0, 1].into_iter().flat_map(|dy| [-1, 0, 1].map(|dx| (dx, dy)));
                 near.filter_map(|(dx, dy)| expected[(i as isize + dy * across as isize + dx) as usize])
                     .all(|expected| squared(&color, &expected) > 3.0 * OTHER_COLOR * OTHER_COLOR)
@@ -181,9 +184,9 @@ impl CloseUp {
     /// differences have little weight.
     fn expected_colors(&self, seen: &[Option<[f32; 3]>]) -> Vec<Option<[f32; 3]>> {
         const ROUNDS: usize = 5;
-        /// Differences above this have less weight, in units of [`lab`].
+        /// A difference of this size has half the weight of a small one, in units of [`lab`].
         const LARGE: f32 = 8.0;
-        /// Keeps the contrast of a plain part from being amplified.
+        /// Pulls the factor on the contrast of a plain part towards 1.
         const PLAIN: f32 = 50.0;
         /// Limits of the factor on a channel's contrast.
         const CONTRASTS: (f32, f32) = (0.3, 2.5);

@@ -23,7 +23,7 @@ const MAX_SHIFT_SQUARED: isize = 5;
 const REACH: usize = 2;
 /// Minimum of the noise level, in grey levels per pixel: gradients below the noise level have little weight.
 const NOISE: f32 = 1.5;
-/// The noise level as a share of the gradients' root mean square, if that is more than [`NOISE`].
+/// This share of the gradients' root mean square is the noise level, unless [`NOISE`] is larger.
 const NOISE_SHARE: f32 = 0.4;
 /// Mean squared length of `v` that is added to every window, so that two empty windows do not correlate.
 const EMPTY: f32 = 0.01;

@@ -37,7 +37,7 @@ pub struct RivalFit {
     pub margin: f64,
     /// Mean correlation of the rival's edges that the photo lacks.
     pub fit: f64,
-    /// Extent of the differences between rival and photo, over the photo's edges; if it is small, the margin is weak
-    /// evidence.
+    /// Extent of the differences between rival and photo, as a share of the photo's edges; if it is small, the margin
+    /// is weak evidence.
     pub share: f64,
 }

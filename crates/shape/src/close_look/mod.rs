@@ -6,8 +6,8 @@
 //! picture, sampled at the pose ────┼─ 120×120 pixels, the part 96 long ─┬─ colours by cell, table's colours ─ bare
 //! mirror image, where it fits best ┘                                    └─ gradients ─ fit, no_rim, added, mirrored
 //! ```
-//! [`crate::Structure`] measures agreement. This module measures contradiction: a hand that covers the part contradicts
-//! nothing, but visible table where the part should be does.
+//! [`crate::Structure`] measures agreement. This module measures contradiction: a hand that covers the part is no
+//! contradiction, but table that is visible in the part's place is one.
 
 mod close_up;
 mod gradients;

@@ -23,7 +23,7 @@ use crate::template::ShapeTemplate;
 
 /// Number of angles at which the rival is laid over the photo.
 const NUM_TURNS: usize = 36;
-/// Number of the best poses of the rival that are followed to the agreement's level.
+/// Number of the best poses of the rival that are followed to the pyramid level at which agreement is computed.
 const NUM_FOLLOWED: usize = 14;
 /// Number of the best followed poses that are tried in pictures.
 const NUM_STARTS: usize = 4;
@@ -31,7 +31,7 @@ const NUM_STARTS: usize = 4;
 const APART_RAD: f64 = 0.2;
 /// Minimum distance between starts, as a share of the edges' root mean square distance from the centre.
 const APART_SHARE: f64 = 0.25;
-/// Largest distance of a refined pose from its start: a picture shows the part in perspective.
+/// Largest distance of a refined pose from its start. It allows for the perspective of a picture.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
 /// Minimum agreement of the photo's edges with themselves at a rotation that is tried in pictures.
 const MIN_RESEMBLANCE: f64 = 0.4;
@@ -179,13 +179,13 @@ impl Rival {
 }
 
 impl CloseUp {
-    /// Extent of the differences between rival and photo, over the photo's edges, with the rival laid over it by
-    /// `photo_from_own`.
+    /// Extent of the differences between rival and photo, as a share of the photo's edges; `photo_from_own` lays the
+    /// rival over the photo.
     fn share_differing(&self, photo: &CloseUp, photo_from_own: &PlanarSimilarity) -> f64 {
         self.laid_over(photo, &photo_from_own.inverse()).share(photo)
     }
 
-    /// The photo compared with this rival, which lies on the photo by `own_from_photo`.
+    /// The photo compared with this rival; `own_from_photo` maps pixels of the photo to pixels of the rival.
     fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let both = self.laid_over(photo, own_from_photo);
         let fit = both.photos.fit(&seen.fits);

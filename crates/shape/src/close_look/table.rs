@@ -4,7 +4,7 @@ use image::RgbImage;
 
 /// Maximum number of colours that describe a picture.
 const NUM_COLORS: usize = 8;
-/// The longer side of the reduced picture from which the colours are read.
+/// Maximum length of the longer side of the reduced picture from which the colours are read, in pixels.
 const SIDE: u32 = 60;
 /// Rounds of the clustering; it converges earlier.
 const ROUNDS: usize = 8;
@@ -13,13 +13,13 @@ const ROUNDS: usize = 8;
 const START_QUANTILE: f64 = 0.97;
 /// Minimum spread of a colour, in units of [`lab`]: noise and shading alone cause this much.
 const MIN_SPREAD: f32 = 3.0;
-/// Minimum share of a table colour.
+/// Minimum share of the pixels that have a colour.
 const MIN_SHARE: f32 = 0.03;
 
 /// The frequent colours of one picture, shared by all poses in it. Deterministic.
 #[derive(Debug, Clone, Default)]
 pub struct TableColors {
-    /// Colour, and its spread.
+    /// Each colour and its spread, the root mean square deviation per channel.
     colors: Vec<([f32; 3], f32)>,
 }
 

@@ -80,7 +80,8 @@ impl Details {
         let picture = self.frame.sampled(image, image_from_cutout);
         let is_seen: Vec<bool> = picture.iter().map(Option::is_some).collect();
         let of_picture = features(&picture, &self.inside, &is_seen);
-        // Where the frame extends beyond the picture, the photo's features get the picture's mask of visible pixels.
+        // Where the frame extends beyond the picture, the photo's features are computed again, with the picture's mask
+        // of visible pixels.
         let cut = is_seen.contains(&false).then(|| features(&self.colors, &self.inside, &is_seen));
         let of_photo = cut.as_ref().unwrap_or(&self.features);
         Some(Network::shipped().compared(of_photo, &of_picture, &self.inside))

@@ -66,7 +66,7 @@ static SHIPPED: LazyLock<Network> = LazyLock::new(|| {
 });
 
 impl Network {
-    /// The weights that we trained.
+    /// The shipped weights.
     pub(super) fn shipped() -> &'static Self {
         &SHIPPED
     }

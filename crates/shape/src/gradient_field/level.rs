@@ -63,7 +63,8 @@ impl GradientLevel {
         Self { width, height, samples, stride: width, before: 0, floor, reading: Reading::new(width, height, width) }
     }
 
-    /// Part of a level, from its corner. Computed without the thread pool, because other threads may wait for it.
+    /// The part of a level of `size` pixels from `corner` on. Computed without the thread pool, because other threads
+    /// may wait for it.
     pub(super) fn window(planes: &Planes, corner: [usize; 2], size: [usize; 2], floor: f32) -> Self {
         let (width, height) = (planes.width, planes.height);
         let mut samples = tensors_of_part(planes, corner, size);

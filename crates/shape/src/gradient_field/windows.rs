@@ -56,8 +56,8 @@ impl Windows {
         [self.planes.width, self.planes.height]
     }
 
-    /// The whole level, for the sweep. Computed before the lock is taken: a thread that waits for others must not hold
-    /// a lock.
+    /// The whole level, for the sweep and for a reach beyond the largest margin. Computed before the lock is taken: a
+    /// thread that waits for others must not hold a lock.
     pub(super) fn whole(&self) -> &GradientLevel {
         match self.whole.get() {
             Some(whole) => whole,

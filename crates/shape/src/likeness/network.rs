@@ -38,7 +38,7 @@ static SHIPPED: LazyLock<LikenessNetwork> = LazyLock::new(|| {
 });
 
 impl LikenessNetwork {
-    /// The weights that we trained.
+    /// The shipped weights.
     pub fn shipped() -> &'static Self {
         &SHIPPED
     }

@@ -144,10 +144,10 @@ const FOLLOWED_AT_ONCE: usize = 8;
 /// right poses on generated parts have more.
 const MIN_FURTHER_AGREEMENT: f64 = 0.4;
 /// Largest gain of agreement from the agreement's level to full resolution. On the tuned sets it is 0.06 at most for 99
-/// of 100 places; a place that would gain more than `MAX_GAIN` is not lost, but placed less exactly.
+/// of 100 places; a place that would gain more than `MAX_GAIN` may be missed.
 const MAX_GAIN: f64 = 0.1;
-/// Two places certainly overlap if their common share of the area exceeds [`MAX_OVERLAP`] by this much, because the
-/// share is estimated from few points and both places still move by some pixels. Chosen by hand.
+/// Two places certainly overlap if their common share of the area exceeds [`MAX_OVERLAP`] by this margin. The margin is
+/// needed because the share is estimated from few points and both places still move by some pixels. Chosen by hand.
 const OVERLAP_MARGIN: f64 = 0.15;
 /// Largest difference of the ln sizes of the parts in one picture: two steps of scale. Chosen by hand to save time.
 const SAME_SIZE: f64 = 0.2;
@@ -192,7 +192,7 @@ pub struct ShapeSearch {
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
-    /// `None` if the part has too few edges at the next coarser level.
+    /// `None` if there is no next coarser level, or if the part has too few edges there.
     screen: Option<Screen>,
 }
 
@@ -350,7 +350,7 @@ impl ShapeSearch {
         Found { pose, agreement: self.comparison(picture).agreement(&pose).both() }
     }
 
-    /// Mean brightness of the part at a pose over that of the demonstration; 1 where it lies outside the image.
+    /// Mean brightness of the part at a pose divided by that of the demonstration; 1 where it lies outside the image.
     pub fn brightness(&self, image: &RgbImage, image_from_demonstration: &PlanarSimilarity) -> f64 {
         self.surface.brightness(image, image_from_demonstration)
     }

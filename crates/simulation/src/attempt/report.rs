@@ -9,15 +9,15 @@ use crate::objects::GraspError;
 /// The record of an attempt.
 #[derive(Debug, Clone)]
 pub struct AttemptReport {
-    /// The outcome: held if, after lifting and waiting, the part was high enough and between both fingers; if it was to
-    /// be put down, it must also be at its place.
+    /// The outcome: held if the part was high enough and between both fingers after lifting and waiting. A part that
+    /// was to be put down must also be at its place.
     pub outcome: GraspOutcome,
     /// The seed of the start configuration.
     pub seed: u64,
     /// The part's pose at the start, in the base frame.
     pub base_from_object: Option<Isometry3<f64>>,
-    /// The target of each picture, if its score is sufficient: from look-out poses until the part was found, then from
-    /// above it.
+    /// The accepted detection of each picture: from look-out poses until the part was found, then from above it. The
+    /// last target is that at the part's height, if this height was determined.
     pub targets: Vec<Option<GraspTarget>>,
     /// Numbers of pictures from look-out poses and from above the detection: one each if the first pictures show the
     /// part.

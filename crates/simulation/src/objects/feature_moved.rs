@@ -1,7 +1,7 @@
 //! Look-alikes with one change: a moved feature, a stretched or shortened region, or a narrower bore.
 //!
-//! All checks use the view from above, like the camera: a moved feature must have the same surface under it, at the
-//! same height, and the view must change visibly.
+//! All checks use the view from above, which is also the camera's. A moved feature must have the same surface under it,
+//! at the same height, and the view must change visibly.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{Rng, SeedableRng};
@@ -52,7 +52,7 @@ impl ObjectSpec {
     /// The part with one change, and a description of it.
     ///
     /// # Errors
-    /// As `visual_meshes`.
+    /// As for `visual_meshes`.
     pub(super) fn with_feature_moved(&self, seed: u64) -> Result<(Self, String)> {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4d4f_5645_445f_4654);
         let meshes = self.visual_meshes()?;

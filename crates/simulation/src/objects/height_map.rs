@@ -92,8 +92,8 @@ impl HeightMap {
         if count == 0 { Point2::origin() } else { Point2::from(sum / f64::from(count)) }
     }
 
-    /// Fraction of the cells filled in either map at which this map, moved, and another map differ: only one of them is
-    /// filled, or their heights differ by more than `tolerance_m`.
+    /// Moves this map and compares it with another map. Returns the fraction of the cells filled in either map at which
+    /// only one map is filled, or the heights differ by more than `tolerance_m`.
     pub(crate) fn difference(&self, other: &Self, other_from_self: &Isometry2<f64>, tolerance_m: f64) -> f64 {
         let (mut both, mut alike, mut own) = (0usize, 0usize, 0usize);
         for (at, z, _) in self.filled() {

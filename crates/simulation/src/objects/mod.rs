@@ -5,8 +5,8 @@
 //! `datasets/objects` are compiled in; any other folder can be read by [`ObjectSpec::from_folder`].
 //!
 //! In the **object frame**, z points up while the part rests on the table. The **marks** `grasp_start` and `grasp_end`
-//! are on the part's axis, where the gripper holds the part: the jaws close across the line between them, and
-//! the tool centre point moves to their mean in x and y, at `grasp_height_m` above the table.
+//! are on the part's axis, where the gripper holds the part. The jaws close across the line between the marks. The tool
+//! centre point moves to the mean of the marks in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
 mod extruded;

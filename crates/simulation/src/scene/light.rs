@@ -13,8 +13,8 @@ const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 /// Radius around the aim within which shadows are rendered, in metres: slightly larger than the wrist camera's view.
 const SHADOW_RADIUS_M: f64 = 0.5;
 
-/// Fraction of a lamp's cone that its shadow map covers. The map has the same number of texels for any area, so that a
-/// wide cone with a narrow map gives both even light and shadows that are sharp to a millimetre.
+/// Fraction of a lamp's cone that its shadow map covers. The wide cone gives even light. The shadow map has the same
+/// number of texels for any area: over this part of the cone, its shadows are sharp to a millimetre.
 const SHADOW_PART_OF_CONE: f64 = 0.35;
 
 /// The half angle of the cone, in degrees, for which a lamp's shadows reach [`SHADOW_RADIUS_M`].
@@ -71,8 +71,8 @@ impl Lighting {
         }
     }
 
-    /// Samples one to three lamps anywhere above the table, warm to cold white, strong or weak, and a varying amount of
-    /// ambient light.
+    /// Samples one to three lamps at random positions above the table, warm to cold white, strong or weak, and an
+    /// amount of ambient light.
     pub fn sample(rng: &mut Pcg64Mcg) -> Self {
         let tint = |rng: &mut Pcg64Mcg| {
             let warmth = rng.random_range(-1.0..1.0);

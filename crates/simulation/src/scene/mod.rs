@@ -38,7 +38,7 @@ pub struct VariationConfig {
     pub object_x_m: Range<f64>,
     /// Range of the object's origin along the base's y, in metres.
     pub object_y_m: Range<f64>,
-    /// Number of distractors.
+    /// Number of distractors; those for which no free position is found are left out.
     pub distractors: RangeInclusive<usize>,
     /// Minimum distance between any two objects on the table, in metres.
     pub clearance_m: f64,
@@ -182,7 +182,7 @@ const DISTRACTOR_MARGIN_M: f64 = 0.05;
 /// At most `count` distractors of a seed with centres between bounds in the base frame, in metres.
 pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
-    // The ends of a range narrower than both margins are exchanged.
+    // If a range is narrower than both margins together, its ends are exchanged.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
     let config = VariationConfig {
         object_x_m: within(x_m),

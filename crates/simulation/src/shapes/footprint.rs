@@ -10,7 +10,7 @@ pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> V
 /// The largest gap between two convex outlines along the normals of their edges; negative if they overlap.
 ///
 /// This is the true distance if the nearest points include an inner point of an edge. If both nearest points are
-/// corners, it is less than the true distance.
+/// corners, it can be less than the true distance.
 pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
         points

@@ -1,8 +1,8 @@
 //! Closed triangle meshes with texture coordinates, created by code and written as OBJ text.
 //!
 //! Positions are stored without normals. [`TriangleMesh::to_obj`] computes one normal per face corner as the average
-//! over the adjacent faces whose angle is below [`CREASE_DEG`]: round surfaces appear smooth, edges stay sharp, and
-//! builders need not handle shading.
+//! over the face itself and the adjacent faces whose angle to it is at most [`CREASE_DEG`]. Round surfaces thus appear
+//! smooth, edges stay sharp, and builders need not handle shading.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ impl TriangleMesh {
         index
     }
 
-    /// Adds a grid of `rows × cols` points and two triangles per cell.
+    /// Adds a grid of `rows × cols` points and two triangles per cell; triangles without area are left out.
     ///
     /// The faces point in the direction (next column) × (next row).
     pub fn push_grid(&mut self, rows: usize, cols: usize, point: impl Fn(usize, usize) -> MeshVertex) {

@@ -289,7 +289,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         })
         .map(|tangent| tangent.normalize())
         .collect();
-    // The direction is transported along the path with the smallest rotation, so that the bar does not twist.
+    // The direction `up` is transported along the path with the smallest rotation, so that the bar does not twist.
     let mut up = vec![perpendicular(&tangents[0])];
     for pair in tangents.windows(2) {
         let turn = UnitQuaternion::rotation_between(&pair[0], &pair[1]).unwrap_or_else(UnitQuaternion::identity);

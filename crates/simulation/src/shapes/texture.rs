@@ -1,4 +1,4 @@
-//! Textures created by code: grain, brushing, turning marks, printed layers, and table tops.
+//! Textures created by code: grain, brushing, turning marks, printed layers, round bars and castings.
 
 use image::{ImageEncoder, Rgb, RgbImage};
 use rand::{Rng, SeedableRng};
@@ -82,8 +82,8 @@ impl Texture {
 
     /// A round bar seen from above, with u around it (0.5 on top): bright on top, dark flanks, a lighter rim.
     ///
-    /// The renderer has no reflections of the surroundings; on a real table, a bar shows these bands from any direction
-    /// above.
+    /// The texture contains these bands, because the renderer does not reflect the surroundings. A real bar on a table
+    /// shows the bands from any direction above.
     pub fn round_bar(size: u32, base: Color, gloss: f64, seed: u64) -> Self {
         let lines = Noise::new_stretched(4, size as usize, seed);
         Self::paint(size, |u, v| {

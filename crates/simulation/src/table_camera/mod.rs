@@ -36,7 +36,7 @@ use crate::views::GraspTruth;
 
 /// Height of the card above the table, in metres.
 const CARD_HEIGHT_M: f64 = 0.05;
-/// Number of noise values that are sampled once; every row of a frame starts at another offset.
+/// Number of noise values that are sampled once; every row of a frame starts at a random offset.
 const NUM_NOISE: usize = 1 << 16;
 
 /// A part on the table in one frame.
@@ -215,7 +215,7 @@ impl TableCamera {
         if self.config.noise == 0.0 {
             return;
         }
-        // Every row starts at another offset, so that the pattern does not repeat between rows or frames.
+        // Every row starts at a random offset, so that the pattern does not repeat between rows or frames.
         let row_len = 3 * picture.width() as usize;
         for row in picture.chunks_exact_mut(row_len) {
             let from = self.rng.random_range(0..NUM_NOISE);

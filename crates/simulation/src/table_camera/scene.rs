@@ -29,7 +29,7 @@ pub(super) fn away() -> Isometry3<f64> {
     Isometry3::translation(0.5, 0.0, AWAY_M)
 }
 
-/// Centre of the outline's box from above, and the outline's largest distance from it.
+/// Centre of the outline's box from above, and the outline's largest distance from this centre.
 pub(super) fn middle_of(spec: &ObjectSpec) -> (Point2<f64>, f64) {
     let bounds = |k: usize| {
         let values = spec.footprint.iter().map(|point| point[k]);

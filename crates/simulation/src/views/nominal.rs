@@ -102,8 +102,8 @@ pub fn test_views(
     })
 }
 
-/// A demonstration of a part: one picture in even light, with the true marks and an outline like that of a careful
-/// person.
+/// A demonstration of a part: one picture in even light, with the true marks and an outline as a careful person would
+/// mark it.
 #[derive(Debug, Clone)]
 pub struct DemonstrationView {
     /// The picture and its camera.
@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// The mask with its holes filled: all pixels that are not connected to the picture's corner.
+    /// The mask with its holes filled: all pixels that no path outside the mask connects to the picture's corner.
     fn filled(mask: &Mask) -> Mask {
         let mut outside = Mask::empty(mask.width(), mask.height());
         let mut open = vec![(0u32, 0u32)];

@@ -3,7 +3,7 @@
 //! ```text
 //! (part, camera, number, seed) ─ ordinary scene, the arm pointing away ─ camera at a height and tilt ─ picture with distortion
 //! ```
-//! They represent a user's second camera, which differs from the camera that took the demonstration's photo.
+//! These cameras represent a user's second camera, which differs from the camera that took the demonstration's photo.
 
 use std::f64::consts::PI;
 
@@ -35,8 +35,8 @@ pub struct OtherCamera {
     pub distances_m: [f64; 2],
 }
 
-/// Three cameras with other focal lengths, lenses and ranges of height than the wrist camera (640 × 480, 550 px, 0.58
-/// m).
+/// Three cameras with other focal lengths, lenses and distances than the wrist camera (640 × 480 pixels, focal length
+/// 550 px, distance 0.58 m).
 pub const OTHER_CAMERAS: [OtherCamera; 3] = [
     OtherCamera {
         name: "webcam",

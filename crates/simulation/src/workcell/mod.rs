@@ -121,7 +121,7 @@ impl Workcell {
     /// with its hand open.
     ///
     /// # Errors
-    /// [`SimulationError::Unstable`] if the scene itself is impossible.
+    /// As for [`Data::forward`], for example if the scene has too many contacts.
     pub fn reset(&mut self, q: &sdg_kinematics::JointVector) -> Result<()> {
         self.data.reset();
         self.panda_ids.set_position(&mut self.data, q);

@@ -40,8 +40,8 @@ impl Workcell {
         self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
-    /// Moves the arm, without advancing time, until its wrist camera is at a pose, and takes a picture, for
-    /// demonstrations and test images.
+    /// Sets the arm to a configuration in which its wrist camera is at a pose, without advancing time, and takes a
+    /// picture. Used for demonstrations and test images.
     ///
     /// # Errors
     /// [`SimulationError::Configuration`] for a pose that the arm cannot reach; and the errors of [`Self::wrist_view`].

@@ -14,7 +14,7 @@ use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 
 /// Function from a state of a moving arm, and its index, to the datagrams that the relay sends instead.
 pub type ChangeState = Box<dyn FnMut(u64, &RobotState) -> Vec<Vec<u8>> + Send>;
-/// Function that decides by its index whether a command of a moving arm is forwarded.
+/// Function that gets the index of a command and decides whether the command is forwarded.
 pub type PassCommand = Box<dyn FnMut(u64) -> bool + Send>;
 
 /// Number of cycles by which the states of a standing arm are late.

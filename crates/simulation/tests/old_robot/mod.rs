@@ -1,4 +1,4 @@
-//! A robot with version 4 of the protocol, like old Pandas, which answers the Connect of one client.
+//! A server that answers the Connect of one client with version 4 of the protocol, as old Pandas do.
 
 use std::io::Write;
 use std::net::{SocketAddr, TcpListener};

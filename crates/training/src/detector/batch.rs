@@ -8,7 +8,7 @@ use sdg_geometry::Polygon;
 use crate::error::TrainingError;
 use crate::prefetch::BatchRequest;
 
-/// The source of samples; each depends only on its index.
+/// The source of samples. Each sample depends only on its index.
 #[derive(Clone, Copy)]
 pub struct SampleSource<'a> {
     /// Whole frames, as in detection.

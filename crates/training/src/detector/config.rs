@@ -30,8 +30,9 @@ pub struct TrainingConfig {
     pub validation: ValidationConfig,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
-    /// Wall-clock time for the whole run. The learning rate then follows the larger progress of steps and time, so that
-    /// a shortened run also ends with a low one. Runs that the budget shortens depend on the machine's speed.
+    /// Wall-clock time for the whole run. The learning rate then follows the progress of the steps or of the time,
+    /// depending on which is larger, so that a shortened run also ends with a low learning rate. Runs that the budget
+    /// shortens depend on the machine's speed.
     pub time_budget: Option<Duration>,
     /// Seed of the samples, their order and every random choice of the losses.
     pub seed: u64,

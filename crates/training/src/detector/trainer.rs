@@ -120,7 +120,7 @@ impl Task for DetectorTask<'_> {
     }
 }
 
-/// A separate seed for every step, far from those of its neighbours.
+/// A separate seed for every step, far from the seeds of the neighbouring steps.
 pub fn step_seed(seed: u64, step: usize) -> u64 {
     seed.wrapping_add((step as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

@@ -114,9 +114,9 @@ impl Validation {
         if self.positives == 0 { 0.0 } else { self.hits as f64 / self.positives as f64 }
     }
 
-    /// One figure for comparing checkpoints, higher is better: hits, minus imprecision, minus a small penalty for false
-    /// alarms, which the check against the demonstration rejects later anyway. (A larger penalty selected networks
-    /// after a third of the run, whose scores were all low.)
+    /// One figure for comparing checkpoints, higher is better: the hit rate, minus imprecision, minus a small penalty
+    /// for false alarms, which verification rejects later anyway. (A larger penalty selected networks after a third of
+    /// the run, whose scores were all low.)
     pub fn merit(&self) -> f64 {
         let false_alarm_rate = self.false_alarms as f64 / self.negatives.max(1) as f64;
         let imprecision = (self.median_error_px / HIT_PX).min(1.0) + (self.median_error_degrees / HIT_DEGREES).min(1.0);

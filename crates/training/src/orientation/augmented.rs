@@ -62,7 +62,7 @@ impl AugmentedCrops {
 
     fn crop(&self, sample: &Sample, rng: &mut Pcg64Mcg) -> Option<LabelledCrop> {
         let object = sample.objects.first()?;
-        // A window cannot be rotated about a part of which only the box is known.
+        // Without an outline, the part's box in a rotated window is unknown.
         let turned = self.style.turned && object.outline.is_some();
         let turn = Angle::from_degrees(if turned { rng.random_range(-180.0..180.0) } else { 0.0 });
         LabelledCrop::of(object, &sample.image, turn, &self.style.jitter, self.size_px, rng)

@@ -8,7 +8,7 @@ use super::labelled_crop::LabelledCrop;
 /// Maximum angle error of a good grasp, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
 
-/// Errors of a network on some crops, in degrees, within the part's symmetry.
+/// Errors of a network on some crops, in degrees. Angles that are equal by the part's symmetry count as equal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleErrors {
     sorted: Vec<f64>,

@@ -18,16 +18,16 @@ const MAX_SCORE: f64 = 0.01;
 /// kept, and this changes the network's score (by 0.036 in one of the pictures). The grasp does not depend on this
 /// choice, because the demonstration decides.
 const MAX_NETWORK_SCORE: f64 = 0.05;
-/// Maximum time of the fastest search of a frame with an `edge` model on one core, without WebGPU. The target is
-/// 200 ms. Measured: 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which this bound
-/// leaves room.
+/// Maximum time of the fastest search of a frame with a model of the preset `edge` on one core, without WebGPU. The
+/// target is 200 ms. Measured: 172 to 184 ms on an idle machine with two cores, and 245 ms on a shared one, for which
+/// this bound leaves room.
 const MAX_MILLISECONDS: f64 = 300.0;
 /// Number of timed searches, after those in which the module's functions are compiled.
 const LOOKS: usize = 7;
 /// Maximum gap between two frames of the page; longer ones are visible as freezing.
 const MAX_PAGE_GAP_MS: f64 = 150.0;
-/// Number of trials: a page that freezes through its own fault does so every time, unlike a page whose core another
-/// process uses.
+/// Number of trials. A page that freezes through its own fault freezes in each of them; a page whose core is used by
+/// another process does not.
 const GAP_TRIALS: usize = 3;
 const MAX_DOWNLOAD_BYTES: usize = 4_000_000;
 /// Maximum additional download for the graphics card: shader compilers, and the weights again.

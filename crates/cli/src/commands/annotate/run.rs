@@ -115,8 +115,8 @@ fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
     Ok(Some(folder.to_owned()))
 }
 
-/// Removes the one image that does not exist yet from `images` and returns it, as the path of the photo to be taken;
-/// `photo.png` in the current folder if all images exist.
+/// The path of the photo to be taken: the one image of `images` that does not exist yet, which is removed from
+/// `images`. If all images exist, it is `photo.png` in the current folder.
 fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
     let is_new = |(image, annotation): &mut (PathBuf, Option<PathBuf>)| annotation.is_none() && !image.exists();
     let mut new = images.extract_if(.., is_new).map(|(image, _)| image);

@@ -85,7 +85,7 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Warns if no picture shows all squares of the board: it may be another board.
+/// Warns if the pictures show fewer columns or rows of squares than the given board has: they may show another board.
 fn warn_of_squares(board: &Board, seen: &[BoardPicture]) {
     let (columns, rows) = BoardPicture::most_squares(seen);
     if (columns, rows) != (board.columns(), board.rows()) {

@@ -120,7 +120,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The sheet's place in the frame of the file.
+/// The sheet's position and direction in the frame of the camera file.
 fn placement(args: &TableArgs) -> Result<SheetPlacement> {
     let thickness = args.sheet_thickness_mm;
     let (frame, [x, y], height_mm) = match args.sheet_in_base_mm[..] {

@@ -59,7 +59,7 @@ impl TakingArgs {
         Ok(self.from.as_ref())
     }
 
-    /// Takes pictures until nothing is missing, the camera ends or Ctrl-C is pressed.
+    /// Takes pictures until no view is missing, the maximum number is taken, the camera ends or Ctrl-C is pressed.
     ///
     /// # Errors
     /// The camera or the folder cannot be used.

@@ -162,7 +162,7 @@ fn write_line(
             writeln!(out, "frame {}: {}{line} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }
-    // Flushed, because programs that read the output wait for this frame.
+    // Flushed, because programs that read the output wait for the lines of this frame.
     Ok(out.flush()?)
 }
 

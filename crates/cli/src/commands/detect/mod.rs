@@ -91,7 +91,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     match (batch.num_failed, batch.num_found > 0) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
-        // For a single picture, its line contains the error.
+        // The error of a single picture is the error of the command.
         (1, _) if batch.is_alone => bail!(batch.last_error),
         (failed, _) => bail!("{failed} of {} pictures could not be used", failed + batch.num_used),
     }

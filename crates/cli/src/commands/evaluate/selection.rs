@@ -1,4 +1,4 @@
-//! Arguments of all kinds of `sdg evaluate`: parts, preset and workers.
+//! Arguments of the evaluations in the simulator (protocol, axes, cameras): parts, preset and workers.
 
 use anyhow::Result;
 use sdg_evaluation::Settings;

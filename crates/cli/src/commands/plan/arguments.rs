@@ -28,7 +28,7 @@ pub fn opening_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
 }
 
-/// `--margin-mm`. No workcell has room for more than 100 mm.
+/// `--margin-mm`. At most 100 mm, because no workcell has room for a larger distance.
 pub fn margin_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a distance", [0.1, 100.0])
 }
@@ -83,7 +83,8 @@ impl FromStr for Held {
     }
 }
 
-/// Minimum distance of a goal from the origin of the robot's base, in mm.
+/// A goal whose coordinates are all below this absolute value, in mm, is rejected, because it was probably given in
+/// metres.
 const MIN_DISTANCE_MM: f64 = 10.0;
 /// Maximum distance of an angle from a multiple of 45 degrees that is attributed to rounding, in radians.
 const ROUNDING_RAD: f64 = 0.006;

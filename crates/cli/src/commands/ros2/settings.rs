@@ -22,7 +22,8 @@ const PICTURE_DEPTH: usize = 10;
 /// Reads the files of the node.
 ///
 /// # Errors
-/// A file cannot be used; a model without lengths is given together with a camera.
+/// A file cannot be used; a table height is given without a base frame; a model without lengths is given, although the
+/// camera's pose is known.
 pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
     let device = devices::open(&args.compute)?;
     let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
@@ -70,10 +71,10 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     })
 }
 
-/// Reads and checks the workcell and the camera of the grasp service.
+/// Reads and checks the workcell and the camera of the grasp service, and checks the speed.
 ///
 /// # Errors
-/// A file cannot be used.
+/// An option or a file is missing, a file cannot be used, or the speed is out of range.
 pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspInputs> {
     let needed = |option: &str| Usage(format!("--allow-motion: expected {option} FILE"));
     let workcell_path = args.arm.workcell.as_ref().ok_or_else(|| needed("--workcell"))?;

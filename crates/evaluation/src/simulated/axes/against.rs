@@ -1,4 +1,5 @@
-//! Compares two runs on the same pictures: whether their models differ, and the number of cases needed to show it.
+//! Compares two runs on the same pictures: whether their models differ, and the number of cases needed to show a
+//! difference.
 
 use std::path::{Path, PathBuf};
 

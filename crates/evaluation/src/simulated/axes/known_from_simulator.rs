@@ -10,7 +10,7 @@ pub(super) struct Given {
     pub error: &'static str,
 }
 
-/// All such quantities, in the order in which an attempt uses them.
+/// All such quantities.
 pub(super) fn known_from_simulator() -> [Given; 13] {
     let given = |what, source, error| Given { what, source, error };
     [

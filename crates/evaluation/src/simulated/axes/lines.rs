@@ -4,7 +4,8 @@ use super::against::RunDifference;
 use super::summary::AxesSummary;
 use super::way::Way;
 
-/// One line for each model in each group and way, and one for each model and condition of the grasps.
+/// One line for each group, model and way (with the check, or by the network alone), and one for each model and
+/// condition of the grasps.
 pub fn summary_lines(summary: &AxesSummary) -> String {
     let mut text = String::new();
     let mut line = |line: String| text += &(line + "\n");

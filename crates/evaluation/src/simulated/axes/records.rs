@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::way::Way;
 
-/// A detection compared with the nearest instance of the part.
+/// A detection compared with the instance that it found, or else with the nearest one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlacedDetection {
     /// Score of the detection; accepted from 0.5.

@@ -28,18 +28,18 @@ pub struct AxesSummary {
     pub grasp_settings: AttemptSettings,
     /// Number of remaining units.
     pub remaining: usize,
-    /// Worker seconds of the results, including teaching.
+    /// Seconds that the workers spent on the results, including teaching.
     pub seconds: Seconds,
     /// The paper's parts, and separately the held-out parts; groups without parts are missing.
     pub groups: Vec<GroupSummary>,
 }
 
-/// Worker seconds.
+/// Seconds that the workers spent, by kind of unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Seconds of all successful teaching runs of the measured models.
+    /// All successful teaching runs of the measured models.
     pub teaching: f64,
-    /// Seconds of pictures: rendering and detection.
+    /// Pictures: rendering and detection.
     pub pictures: f64,
     pub grasps: f64,
 }

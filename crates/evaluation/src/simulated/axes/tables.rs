@@ -132,7 +132,7 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
     for axis in axes_of(group) {
         let of = |model: ModelKind, third: usize| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
         let range = |third: usize| models.iter().find_map(|model| of(*model, third)?.range);
-        // If there are always three instances, the parameter has the same range in every third.
+        // On the axis of instances, the parameter is constant, so the thirds do not differ in difficulty.
         if range(0) == range(2) && range(0).is_some_and(|[low, high]| low == high) {
             continue;
         }

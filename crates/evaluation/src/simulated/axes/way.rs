@@ -24,7 +24,7 @@ impl Way {
         }
     }
 
-    /// Whether a model has this way: a model without a network has only the check.
+    /// Whether a model is measured in this way: a model without a network is measured only with the check.
     pub fn is_of(self, model: ModelKind) -> bool {
         self == Self::WithCheck || model.has_network()
     }

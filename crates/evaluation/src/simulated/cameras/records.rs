@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// An accepted detection, compared with the nearest instance of the part.
+/// An accepted detection, compared with the instance that it found, or else with the nearest one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricAnswer {
     pub score: f64,

@@ -11,7 +11,8 @@ use super::units::CamerasEvaluation;
 use crate::simulated::cell::Cell;
 use crate::statistics::Share;
 
-/// Minimum height of the marks above the table, in metres, of a part whose walls are visible from the side.
+/// A part is high if its marks are more than this height above the table, in metres: its walls are then visible from
+/// the side.
 pub(super) const HIGH_M: f64 = 0.010;
 
 /// Errors of found instances.
@@ -27,7 +28,7 @@ pub struct ErrorFigures {
     pub p95_deg: Option<f64>,
     /// Position errors within the radius that the detections give for 68 %.
     pub within_sigma_mm: Share,
-    /// Angle errors within the detections' sigma.
+    /// Angle errors within the bound that the detections give for 68 %.
     pub within_sigma_deg: Share,
 }
 
@@ -54,9 +55,9 @@ pub struct CamerasSummary {
     pub sets: Vec<SetFigures>,
     /// Results of each model and set, for low and high parts separately.
     pub by_height: Vec<SetFigures>,
-    /// Results of each part, for the three cameras together.
+    /// Results of each model and part, for the three cameras together.
     pub by_part: Vec<SetFigures>,
-    /// Worker seconds for the pictures.
+    /// Seconds that the workers spent on the pictures.
     pub seconds: f64,
     /// Number of remaining units.
     pub remaining: usize,

@@ -62,7 +62,8 @@ fn why_missing(state: &UnitState) -> String {
     }
 }
 
-/// The first difference between a unit's results and its receipt, these settings, or this program.
+/// The first difference between a unit's receipt and this run's settings or program, or between the receipt and the
+/// unit's files.
 fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Result<Option<String>> {
     if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
         return Ok(Some(format!("stale: done with other settings ({difference})")));

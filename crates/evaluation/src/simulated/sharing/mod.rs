@@ -1,5 +1,5 @@
-//! An evaluation whose units are done by many processes on machines with a common folder: in Slurm's job arrays, or
-//! started by hand.
+//! An evaluation whose units are done by many processes on machines with a common folder. The processes are tasks of
+//! Slurm's job arrays, or are started by hand.
 //!
 //! ```text
 //! all_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)

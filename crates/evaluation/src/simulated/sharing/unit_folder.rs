@@ -45,9 +45,9 @@ impl UnitFolder {
         Self(evaluation.join("units").join(unit))
     }
 
-    /// Takes the unit for this process once its holder has ended. `wait` is called repeatedly, and may return `false`
-    /// to stop waiting; the result is then `None`. A file system without locks grants every request: duplicates are
-    /// then detected by two receipts.
+    /// Takes the unit for this process, after the process that holds it, if any, has ended. `wait` is called
+    /// repeatedly, and may return `false` to stop waiting; the result is then `None`. A file system without locks
+    /// grants every request: duplicates are then detected by two receipts.
     ///
     /// # Errors
     /// The folder cannot be written.

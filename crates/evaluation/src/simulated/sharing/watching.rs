@@ -37,7 +37,7 @@ pub struct Progress {
     pub seconds_left: Option<f64>,
     /// Number of finished units and of all units of each kind.
     pub kinds: Vec<KindProgress>,
-    /// Whether the progress is final: all units are done, have failed twice, or wait for a failed unit.
+    /// Whether the progress is final: all units are done, have failed twice, or wait for a unit that has failed twice.
     pub is_settled: bool,
 }
 

@@ -1,4 +1,5 @@
-//! The paper's two tables for this project, and more detailed ones: here as Markdown, with the same rows on the page.
+//! The paper's two tables with this project's results, and more detailed tables. The Markdown document and the page
+//! have the same rows.
 
 mod document;
 mod grasping;

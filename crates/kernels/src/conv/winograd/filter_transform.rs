@@ -1,5 +1,5 @@
-//! Winograd's transforms of weights, on sixteen filters at a time, down the columns of a kernel and then along
-//! its rows.
+//! Winograd's transforms of weights, on sixteen filters at a time, down the columns of a kernel and then along its
+//! rows. With a = 1/√2, b = √2:
 //!
 //! ```text
 //! G: u₀ = g₀, u₁,₂ = −⅔ (g₀ ± a g₁ + a² g₂), u₃,₄ = ⅙ (g₀ ± b g₁ + b² g₂), u₅ = g₂

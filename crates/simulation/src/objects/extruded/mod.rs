@@ -35,8 +35,8 @@ const NUM_STRIPS: usize = 40;
 const MIN_BOX_M: f64 = 1e-4;
 /// Maximum size of the texture: the camera would not resolve a larger one.
 const MAX_TEXTURE_PX: u32 = 1024;
-/// Distance inside the outline from which the walls take the photo's colour, in pixels: on the outline itself half of
-/// the colour is that of the table.
+/// The walls take the photo's colour at this distance inside the outline, in pixels, because the colour on the outline
+/// itself is half the table's.
 const WALL_INSET_PX: f64 = 2.0;
 
 /// The data of an extruded part; positions in pixels of `photo`, which is taken vertically from above.

@@ -27,7 +27,8 @@ pub enum Axis {
     Instances,
     /// A look-alike instead of the part.
     LookAlikes,
-    /// As [`Self::Tilt`], by 0 to 35 degrees. The last variant, because an axis' position determines its random numbers.
+    /// As [`Self::Tilt`], by 0 to 35 degrees. It is the last variant, because its position in the enum determines an
+    /// axis' random numbers, and those of the other axes must not change.
     Slant,
 }
 

@@ -27,9 +27,9 @@ const CELL_M: f64 = 0.001;
 /// Distance at which a distractor starts, from its aim on the part, in metres.
 const START_M: f64 = 0.32;
 
-/// Corner of the monitored area of the table, in metres.
+/// Corner, with the smallest coordinates, of the table area that the raster covers, in metres.
 const CORNER: Point2<f64> = Point2::new(-0.1, -0.7);
-/// Width and height of the monitored area, in cells.
+/// Width and height of the raster, in cells.
 const WIDTH: usize = 1200;
 const HEIGHT: usize = 1400;
 

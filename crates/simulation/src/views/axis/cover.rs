@@ -151,7 +151,7 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
     };
     let part = ordinary.object.clone().ok_or_else(none)?;
     for number in 0..MAX_COVERS {
-        // If the usual distractors are too small for the part, larger ones are tried.
+        // The covers become larger, because the usual distractors may be too small for the part.
         let scale = 1.0 + f64::from(number) / f64::from(MAX_COVERS);
         let slide = Slide::new(&part, &part_map, scale, &mut request.rng);
         let Some(estimate) = slide.distance_for(wanted) else { continue };

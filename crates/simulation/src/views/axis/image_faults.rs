@@ -31,7 +31,7 @@ const BLUR_POINTS: usize = 64;
 
 /// Range of the logarithm of the ratio by which a colour cast changes red relative to blue.
 const CAST_LOG_RATIOS: std::ops::Range<f64> = 0.15..0.9;
-/// Largest fraction of this logarithm by which green changes relative to red and blue.
+/// Largest logarithm of the factor for green, as a fraction of the logarithm of the ratio of red to blue.
 const GREEN_SHARE: f64 = 0.35;
 
 /// Linear light of a picture, row by row, three channels per pixel.

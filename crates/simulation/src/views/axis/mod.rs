@@ -55,8 +55,8 @@ pub struct AxisView {
 /// Renders picture `number` of an axis.
 ///
 /// # Errors
-/// As for [`Workcell::new`]; [`Configuration`](crate::SimulationError::Configuration) if no pose of camera or cover
-/// gives the picture that the axis requires.
+/// As for [`Workcell::new`]; [`Configuration`](crate::SimulationError::Configuration) if no pose of the camera, the
+/// cover or the instances gives the picture that the axis requires.
 pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut request = Request::new(spec, axis, number, seed);
     if axis == Axis::LookAlikes {
@@ -113,9 +113,9 @@ mod tests {
     use crate::scene::PlacedObject;
     use crate::shapes::footprint;
 
-    /// Largest distance in pixels between the centres of the rendered part and of its projected top. A wall of 12 mm
-    /// seen from 20 degrees off the vertical covers 4 px on one side and moves the centre by half of that; the rest
-    /// allows for the raster of a millimetre.
+    /// Largest distance in pixels between the centres of the rendered part and of its projected top. A wall of 12 mm,
+    /// seen from 20 degrees off the vertical, covers 4 px on one side and moves the centre by 2 px. The rest of the
+    /// tolerance allows for the raster of a millimetre.
     const MIDDLE_TOLERANCE_PX: f64 = 3.0;
 
     #[test]
@@ -187,7 +187,7 @@ mod tests {
             let shown = axis_view(&spec, Axis::Covered, number, 8).unwrap();
             let stratum = |number: u64| 0.10 + 0.30 * number as f64 / PICTURES_PER_AXIS as f64;
             let covered = 1.0 - shown.truths[0].visible_share;
-            // The cover stops within two percent of the wanted fraction.
+            // The covered fraction is within two percentage points of the wanted one.
             assert!(
                 (stratum(number) - 0.02..stratum(number + 1) + 0.02).contains(&covered),
                 "{name} {number}: {covered}"
