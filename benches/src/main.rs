@@ -9,8 +9,8 @@
 //! ```
 //!
 //! [`registry`] lists the compared works. Both sides load the same weights, process the same pictures and report
-//! facts about their results (number of boxes, scores), which must agree before anything is timed. Left out:
-//! installing the peers (`make bench`) and testing our kernels (their own tests).
+//! facts about their results (number of boxes, scores), which must agree before anything is timed. This program does not
+//! install the peers (`make bench` does) and does not test our kernels (their own tests do).
 #![forbid(unsafe_code)]
 #![allow(missing_docs, reason = "a program that measures")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]

@@ -15,13 +15,13 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-/// Numbers that identify the result; those of both sides must agree to 1 %.
+/// Numbers that identify the result; those of our worker and of a peer must agree within 1 %.
 pub type Facts = BTreeMap<String, f64>;
 
 /// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
-    /// Seconds of the whole untimed run; `None` without such a run.
+    /// Seconds of the whole warm-up run; `None` without a warm-up.
     pub seconds: Option<f64>,
     pub facts: Facts,
     /// Multiplications and additions in the network's products, in units of 1e9, if the worker counts them.

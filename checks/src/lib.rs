@@ -1,6 +1,7 @@
-//! Checks of the sources and documents themselves, run by `tests/`: no two files of a crate import from each other,
-//! every relative link in a document has a target, the table of crates in ARCHITECTURE.md agrees with `cargo metadata`,
-//! and tables of figures state the commit of their measurement and whether the program changed since.
+//! Checks of the sources and documents themselves, run by `tests/`. Among them: no files or folders of a crate import
+//! from each other in a circle, every relative link in a document has a target, the table of crates in ARCHITECTURE.md
+//! agrees with `cargo metadata`, and tables of figures state the commit of their measurement and whether the program
+//! changed since.
 //!
 //! ```
 //! use sdg_checks::ModuleGraph;

@@ -1,7 +1,7 @@
 //! The address of a camera, as text.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -162,12 +162,19 @@ impl fmt::Display for Address {
             Self::V4l(NodeName::Card(card)) => write!(f, "v4l:{card}"),
             Self::Http(url) => write!(f, "{url}"),
             Self::Command(line) => write!(f, "cmd:{line}"),
-            Self::Folder { path, playback } => write!(f, "dir:{}{playback}", path.display()),
-            Self::File { path, playback } => write!(f, "file:{}{playback}", path.display()),
+            Self::Folder { path, playback } => write!(f, "dir:{}", with_options(path, playback)),
+            Self::File { path, playback } => write!(f, "file:{}", with_options(path, playback)),
             Self::Sim(rest) => write!(f, "sim:{rest}"),
             Self::Ros2(rest) => write!(f, "ros2:{rest}"),
         }
     }
+}
+
+/// The text from which [`parse_playback`] reads them: a path with a question mark needs another one after it.
+fn with_options(path: &Path, playback: &Playback) -> String {
+    let options = playback.to_string();
+    let mark = if options.is_empty() && path.as_os_str().as_encoded_bytes().contains(&b'?') { "?" } else { "" };
+    format!("{}{options}{mark}", path.display())
 }
 
 impl fmt::Display for Playback {
@@ -225,6 +232,9 @@ mod tests {
         assert_eq!((path.to_str().unwrap(), playback.interval), ("what?now", Some(Duration::from_millis(250))));
         let Address::File { path, .. } = "file:what?now?".parse().unwrap() else { panic!() };
         assert_eq!(path.to_str().unwrap(), "what?now");
+        for text in ["dir:what?now?fps=4", "file:what?now?", "file:now.png"] {
+            assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
+        }
     }
 
     #[test]

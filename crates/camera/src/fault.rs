@@ -48,7 +48,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The name in JSON: one word in lower case.
+    /// The name in JSON, in lower case with hyphens.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Stale { .. } => "stale",

@@ -267,8 +267,8 @@ uint32_t sdg_abi_version(void);
 sdg_status sdg_check_abi(uint32_t abi_version);
 
 /* Copies the text of the calling thread's last error to buffer, in UTF-8, truncated if necessary and always
- * zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The text is valid
- * until the thread's next error. */
+ * zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The library
+ * keeps the text until the thread's next error. */
 size_t sdg_last_error(char *buffer, size_t num_bytes);
 
 /* Reads the file of a grasp model. */
@@ -304,8 +304,8 @@ sdg_status sdg_detections_polygon(sdg_handle detections, size_t idx, double *num
  * num_keypoints. */
 sdg_status sdg_detections_keypoints(sdg_handle detections, size_t idx, double *numbers, size_t max_points);
 
-/* Copies all detections to buffer like sdg_last_error, as the array of `sdg detect --json` with all digits. The size
- * of the complete text with its zero byte is written to needed, unless that is NULL. */
+/* Copies all detections to buffer, in the same way as sdg_last_error: the array of `sdg detect --json`, with unrounded
+ * numbers. The size of the complete text with its zero byte is written to needed, unless that is NULL. */
 sdg_status sdg_detections_json(sdg_handle detections, char *buffer, size_t num_bytes, size_t *needed);
 
 /* Frees a model, a camera or detections. The handle is invalid from then on; calls in other threads that began before

@@ -24,8 +24,8 @@ pub extern "C" fn sdg_check_abi(abi_version: u32) -> sdg_status {
 }
 
 /// Copies the text of the calling thread's last error to buffer, in UTF-8, truncated if necessary and always
-/// zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The text is valid
-/// until the thread's next error.
+/// zero-terminated. Returns the size of the complete text with its zero byte. buffer may be NULL. The library
+/// keeps the text until the thread's next error.
 ///
 /// # Safety
 /// `buffer` is null or writable for `num_bytes`.
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn sdg_model_save(model: sdg_handle, file: *const c_char) 
 /// Teaches a model like `sdg teach`, on all cores, which takes seconds or minutes.
 ///
 /// # Safety
-/// `from` is null or has pointers that are null or zero-terminated strings; `model` is null or writable for a handle.
+/// `from` is null, or each pointer in it is null or points to a zero-terminated string; `model` is null or writable for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_handle) -> sdg_status {
     let taught = || {
@@ -181,8 +181,8 @@ pub unsafe extern "C" fn sdg_detections_keypoints(
     })
 }
 
-/// Copies all detections to buffer like sdg_last_error, as the array of `sdg detect --json` with all digits. The size
-/// of the complete text with its zero byte is written to needed, unless that is NULL.
+/// Copies all detections to buffer, in the same way as sdg_last_error: the array of `sdg detect --json`, with unrounded
+/// numbers. The size of the complete text with its zero byte is written to needed, unless that is NULL.
 ///
 /// # Safety
 /// `buffer` is null or writable for `num_bytes`; `needed` is null or writable for a number.

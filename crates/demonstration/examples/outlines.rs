@@ -1,6 +1,7 @@
 //! Compares proposed outlines with drawn ones, without clicks and after one and two clicks of a simulated person.
 //! Prints the overlap, the fraction of the true outline within 3 px (or 1 % of the part's diagonal if that is more),
-//! the time, and at the end the medians.
+//! the time, and at the end the medians of overlap and fraction, and the number of outlines with a fraction of at least
+//! 90 %.
 //!
 //! ```sh
 //! cargo run --release -p sdg-demonstration --example outlines -- PICTURE[:ANNOTATION] …
@@ -50,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         let reached = all.iter().filter(|one| one.near >= 0.9).count();
         println!(
-            "{clicks} clicks: median overlap {:.3}, median share near {:.0} %; {reached} of {} have 90 % near",
+            "{clicks} clicks: median overlap {:.3}, median fraction within the tolerance {:.0} %; {reached} of {} have at least 90 %",
             median(|one| one.iou),
             100.0 * median(|one| one.near),
             all.len()

@@ -4,9 +4,9 @@
 use crate::config::{NormKind, RcnnConfig, ResizeRule, RoiPoolerConfig, SamplingRatio};
 use crate::error::{DetectionError, Result};
 
-/// Maximum number of values in one layer's output for one image, nine times that of R-50 on the largest image (1333 ×
-/// 1333 pixels); in single precision, one gigabyte.
-const MAX_OUTPUT_VALUES: f64 = (1 << 28) as f64;
+/// Maximum number of values in one layer's output for one image, eighteen times that of R-50 on the largest image (1333 ×
+/// 1333 pixels); in single precision, two gigabytes.
+const MAX_OUTPUT_VALUES: f64 = (1 << 29) as f64;
 /// Maximum side of the resized image, in pixels; Detectron2 and torchvision use at most 1333.
 const MAX_SIDE_PX: u32 = 4096;
 /// Maximum number of blocks in a stage; ResNet-152 has 36.

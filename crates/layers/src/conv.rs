@@ -127,7 +127,7 @@ impl Conv2dShape {
         self.out_channels * self.kernel * self.kernel
     }
 
-    /// Initialises the parameters at random. A norm replaces the bias.
+    /// Draws the kernel from `distribution`; the bias is zero. A norm replaces the bias.
     pub fn init(self, distribution: Distribution, norm: NormKind, init: &mut Initializer) -> Conv2d {
         let Self { in_channels, out_channels, kernel, stride } = self;
         let weight = init.param([out_channels, in_channels, kernel, kernel], distribution);

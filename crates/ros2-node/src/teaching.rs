@@ -14,7 +14,7 @@ use tempfile::TempPath;
 /// The inputs of a teaching run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
-    /// The photo, followed by a colon and the file of its marks if that is not beside the photo.
+    /// The photo's path. `PHOTO:MARKS` names a file of marks that is not beside the photo.
     pub photo: String,
     /// The file of marks, if the request named or contained one.
     pub marks: Option<PathBuf>,
@@ -32,7 +32,7 @@ pub struct TeachJob {
     pub is_used: bool,
 }
 
-/// Teaches in the same way as the caller's command, and writes the model.
+/// Teaches as the command `teach` of the program that runs the node, and writes the model.
 pub type Teach = dyn Fn(&TeachJob) -> Result<()> + Send + Sync;
 
 impl TeachJob {
@@ -87,7 +87,7 @@ impl Teaching {
     /// Begins teaching for a request.
     ///
     /// # Errors
-    /// An error for an invalid request.
+    /// An invalid request, or marks that cannot be written to a temporary file.
     pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>) -> Result<Self> {
         let (job, marks) = TeachJob::read(request)?;
         Ok(Self { _marks: marks, ..Self::begin(job, teach) })
@@ -99,7 +99,7 @@ impl Teaching {
         Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
     }
 
-    /// The model file and the duration, or the reason why there is no model; `None` while teaching is in progress.
+    /// The model file and the duration in seconds, or the reason why there is no model; `None` while teaching is in progress.
     pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
         if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_request_is_a_job_with_defaults_and_its_marks_are_a_file_for_its_time() {
+    fn a_request_becomes_a_job_with_defaults_and_a_temporary_file_of_marks() {
         let request = TeachRequest {
             photo_path: "part.png".to_owned(),
             out_path: "part.sdg".to_owned(),

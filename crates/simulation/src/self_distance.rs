@@ -74,7 +74,7 @@ mod tests {
     use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
 
     #[test]
-    fn the_hand_is_near_the_base_where_the_arm_folds_and_nowhere_in_the_ready_pose() {
+    fn capsules_overlap_in_a_folded_arm_and_are_apart_in_the_ready_pose() {
         let xml = format!("<mujoco><compiler angle='radian'/><include file='{PANDA_FILE}'/></mujoco>");
         let model = Arc::new(Model::from_xml(&xml, &[panda_asset()]).unwrap());
         let ids = PandaIds::find(&model).unwrap();

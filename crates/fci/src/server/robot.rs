@@ -1,5 +1,5 @@
 //! The simulated robot: it takes requests and commands and returns responses and states, cycle by cycle. It has no
-//! socket and no clock.
+//! socket, and its time advances only by calls.
 
 use nalgebra::Isometry3;
 
@@ -111,7 +111,7 @@ impl RobotCore {
         self.motion.as_ref().map(|motion| motion.communication.has_started())
     }
 
-    /// Whether nothing moves and no request waits for an answer.
+    /// Whether nothing moves (or no motion has run for [`MAX_SETTLING_CYCLES`]) and no request waits for an answer.
     pub fn is_settled(&self) -> bool {
         let is_still = self.observation.dq.amax() < STILL || self.idle_cycles > MAX_SETTLING_CYCLES;
         self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest() && is_still

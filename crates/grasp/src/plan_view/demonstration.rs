@@ -19,7 +19,8 @@ use crate::taught::TaughtDemonstration;
 /// Heights are in metres above the table.
 ///
 /// # Errors
-/// No demonstration, a camera whose pictures do not show the plane, and marks outside the visible part of the plane.
+/// No demonstration, a camera whose pictures do not show the plane, marks outside the visible part of the plane, and
+/// marks that [`Demonstration::check`] refuses in the plan view.
 pub fn seen_from_above(
     demonstrations: &[Demonstration],
     over_table: &CameraOverTable,
@@ -61,12 +62,13 @@ pub fn pictures_from_above(
     Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
 }
 
-/// Whether a region of a camera's pictures can be searched for the part of demonstrations made by
-/// [`super::seen_from_above`].
+/// Checks that a region of a camera's pictures can be searched for the taught part. The demonstrations are those made
+/// by [`super::seen_from_above`].
 ///
 /// # Errors
 /// A region that extends beyond the pictures or belongs to pictures of another size, that does not show the plane, or
-/// that is too small for the part.
+/// that is too small for the part; a camera whose pictures do not show the plane; demonstrations without a grasp or a
+/// shape to compare.
 pub fn check_region_from_above(
     region: &SearchRegion,
     demonstrations: &[Demonstration],

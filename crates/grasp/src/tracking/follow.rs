@@ -1,4 +1,5 @@
-//! Refines one part in one frame: a window around its expected pose, its gradients, and the edges in it.
+//! Refines one part in one frame: cuts a window around the part's expected pose, computes the window's gradients, and
+//! fits the part's edges to them.
 //!
 //! ```text
 //! expected pose ─ outline's box and the reach ─ window, halved as in the search ──── GradientField
@@ -25,10 +26,11 @@ use crate::taught::TaughtDemonstration;
 const BORDER_PX: f64 = 9.0;
 /// Minimum side of a pyramid level; as in `sdg_shape`.
 const MIN_LEVEL_SIDE: u32 = 24;
-/// Range of a close look, in lengths of the part: 1.25, plus a pixel for interpolation.
+/// Side of the square of a close look, in lengths of the part: 1.25, and 0.03 so that at least one pixel remains for
+/// interpolation.
 const SEEN_CLOSELY: f64 = 1.28;
 
-/// Tolerance of the agreement of a part that has not moved, for noise. Chosen by hand.
+/// Maximum decrease of the agreement of a part that has not moved, caused by noise. Chosen by hand.
 const STILL_AGREEMENT: f64 = 0.005;
 
 /// A demonstration at the size at which a part is followed.
@@ -62,7 +64,7 @@ pub(super) struct StillPose {
 pub(super) struct Followed {
     /// Whether the part lies at the pose of the last search.
     pub(super) is_held: bool,
-    /// The pose by edges alone.
+    /// The pose by edges alone; the pose of the last search if `is_held`.
     pub(super) by_edges: PlanarSimilarity,
     /// The pose by edges and surface: the pose by edges, or a correction of it.
     pub(super) image_from_cutout: PlanarSimilarity,
@@ -117,7 +119,7 @@ impl SizedPart {
         self.range.log_size(scale)
     }
 
-    /// Refines the part near `start`; `None` if too little of it lies in the frame. `correction` is the offset of the
+    /// Refines the part near `start`; `None` if the frame is smaller than a pixel of the halved picture. `correction` is the offset of the
     /// last found pose from the pose by edges alone, applied if it improves the agreement with the frame. If the
     /// frame's agreement with `still` has not decreased, the part lies at that pose, and nothing is refined.
     ///
@@ -175,7 +177,7 @@ impl SizedPart {
         })
     }
 
-    /// A close look at a pose; `None` if too little of it lies in the frame.
+    /// A close look at a pose; `None` as for [`Self::refined`].
     pub(super) fn close_look(
         &self,
         detector: &PartDetector,
