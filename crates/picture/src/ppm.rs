@@ -100,7 +100,7 @@ mod tests {
         assert_eq!((picture.dimensions(), picture.as_raw().as_slice()), ((2, 1), [1, 2, 3, 4, 5, 6].as_slice()));
         for (bytes, expected) in [
             (b"P6 2 1 255\n\x01\x02\x03".as_slice(), "ends after 14 bytes"),
-            (b"P6 2 1 65535\n", "up to 65535"),
+            (b"P6 2 1 65535\n", "the maximum value 65535"),
             (b"P6 0 1 255\n", "0 × 1"),
             (b"P6 16384 16384 255\n", "16384 × 16384"),
             (b"P6 1 16385 255\n", "1 × 16385"),
