@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn drawn(init: &mut Initializer, count: usize, distribution: Distribution) -> Vec<f32> {
-        init.param([count], distribution).val().into_data().to_vec().unwrap()
+        init.param([count], distribution).val().into_data().try_to_vec().unwrap()
     }
 
     #[test]
