@@ -2,9 +2,12 @@
 
 export const by = (id) => document.getElementById(id);
 
+/** A new element with these fields. */
+export const element = (tag, fields) => Object.assign(document.createElement(tag), fields);
+
 /** A button with this text. */
 export function button(text, action, classes = "") {
-  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text, className: classes });
+  const made = element("button", { type: "button", textContent: text, className: classes });
   made.addEventListener("click", action);
   return made;
 }

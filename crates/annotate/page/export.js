@@ -1,5 +1,6 @@
 // All detections as a file: CSV with one line per grasp, or JSON similar to that of "sdg detect --json".
 
+import { element } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { isFound, state, touchedBy } from "./store.js";
 
@@ -49,7 +50,7 @@ export function exportPictures(kind) {
     ? [COLUMNS, ...looked.flatMap(rows)].map((row) => COLUMNS.map((_, i) => field(row[i])).join(",")).join("\r\n")
     : looked.map((trial) => JSON.stringify(record(trial))).join("\n");
   const url = URL.createObjectURL(new Blob([`${text}\n`], { type: kind === "csv" ? "text/csv" : "application/json" }));
-  const link = Object.assign(document.createElement("a"), { href: url, download: `${state.label}-found.${kind}` });
+  const link = element("a", { href: url, download: `${state.label}-found.${kind}` });
   link.click();
   setTimeout(() => URL.revokeObjectURL(url), 1000);
 }

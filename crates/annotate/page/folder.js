@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
-import { button, by } from "./elements.js";
+import { button, by, element } from "./elements.js";
 import { changed, isLive, state } from "./store.js";
 import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
@@ -77,10 +77,10 @@ function render() {
   by("folder-all").textContent = `Add all ${others.length}`;
   by("folder-choose").hidden = !isPhoto;
   by("folder-list").replaceChildren(...others.map(({ id, name }) => {
-    const item = document.createElement("li");
+    const item = element("li");
     const choose = button("", () => (isPhoto ? takePhoto(id) : takeTrials([id])));
-    const picture = Object.assign(document.createElement("img"), { alt: "", loading: "lazy", src: api.otherUrl(id) });
-    choose.append(picture, Object.assign(document.createElement("span"), { textContent: name }));
+    const picture = element("img", { alt: "", loading: "lazy", src: api.otherUrl(id) });
+    choose.append(picture, element("span", { textContent: name }));
     item.append(choose);
     return item;
   }));

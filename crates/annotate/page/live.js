@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
-import { by, offBecause } from "./elements.js";
+import { by, element, offBecause } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -244,7 +244,7 @@ function renderTrying() {
   if (by("live-found").dataset.shown === text) return;
   by("live-found").dataset.shown = text;
   by("live-found").replaceChildren(...told.map(([title, score, pose, touching]) => {
-    const item = document.createElement("div");
+    const item = element("div");
     item.className = "found";
     item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p><p class="warning"></p>';
     item.querySelector("span").textContent = title;

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
-import { by, offBecause } from "./elements.js";
+import { button, by, element, offBecause } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
@@ -133,20 +133,14 @@ function renderAdvice({ advice }) {
   if (list.dataset.shown !== remarks) {
     list.dataset.shown = remarks;
     list.replaceChildren(...advice.remarks.map((remark) => {
-      const item = document.createElement("li");
+      const item = element("li");
       item.dataset.code = remark.code;
       item.append(remark.text);
       if (["gripper_along", "grasp_one_sided"].includes(remark.code)) {
-        const button = document.createElement("button");
-        button.textContent = "Turn to fit";
-        button.addEventListener("click", turnToFit);
-        item.append(button);
+        item.append(button("Turn to fit", turnToFit));
       }
       if (remark.fix) {
-        const button = document.createElement("button");
-        button.textContent = remark.fix.box ? "Fit the box" : "Fit the jaws";
-        button.addEventListener("click", () => fix(remark.fix));
-        item.append(button);
+        item.append(button(remark.fix.box ? "Fit the box" : "Fit the jaws", () => fix(remark.fix)));
       }
       return item;
     }));
@@ -156,13 +150,13 @@ function renderAdvice({ advice }) {
   const text = JSON.stringify(models);
   if (enough.dataset.shown === text) return;
   enough.dataset.shown = text;
-  const title = document.createElement("h3");
+  const title = element("h3");
   const ready = models.filter((m) => !m.lacks.length).length;
   title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : `Still needed: ${models[0].lacks.join(" and ")}`;
   if (!ready || ready === models.length) return enough.replaceChildren(title);
-  const items = document.createElement("ul");
+  const items = element("ul");
   for (const { model, lacks } of models) {
-    const item = document.createElement("li");
+    const item = element("li");
     item.className = lacks.length ? "" : "ready";
     item.textContent = lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`;
     items.append(item);

@@ -1,7 +1,7 @@
 // The second step: a sheet of samples made from the marks.
 
 import { api } from "./api.js";
-import { by, offBecause } from "./elements.js";
+import { by, element, offBecause } from "./elements.js";
 import { image, isAnyMarked, state } from "./store.js";
 
 const COUNT = 12;
@@ -37,8 +37,8 @@ export function renderSamples() {
   // With the revision, the samples of changed marks have other addresses.
   const revision = image().revision;
   sheet.replaceChildren(...Array.from({ length: COUNT }, (_, i) => {
-    const item = document.createElement("li");
-    const picture = document.createElement("img");
+    const item = element("li");
+    const picture = element("img");
     picture.alt = `Sample ${first + i + 1}`;
     picture.width = image().width;
     picture.height = image().height;

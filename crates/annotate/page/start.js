@@ -1,7 +1,7 @@
 // Without a project: opens a recent one, or creates a new one from a photo.
 
 import { api } from "./api.js";
-import { button, by } from "./elements.js";
+import { button, by, element } from "./elements.js";
 
 const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** Names that cameras give to any picture. */
@@ -58,10 +58,10 @@ export function showStart({ folder, recent }) {
   }
   by("recent").hidden = !recent.length;
   by("recent-list").replaceChildren(...recent.map(({ id, name, path, opened_secs: secs }) => {
-    const item = document.createElement("li");
+    const item = element("li");
     const open = button("", () => go(() => api.openProject(id)));
     const when = new Date(secs * 1000).toLocaleString();
-    for (const [tag, text] of [["b", name], ["small", path], ["small", when]]) open.append(Object.assign(document.createElement(tag), { textContent: text }));
+    for (const [tag, text] of [["b", name], ["small", path], ["small", when]]) open.append(element(tag, { textContent: text }));
     item.append(open);
     return item;
   }));

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
-import { by } from "./elements.js";
+import { by, element } from "./elements.js";
 import { toast } from "./toast.js";
 import { changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
 import { replacePicture, show } from "./view.js";
@@ -146,7 +146,7 @@ export function renderStrip() {
     const entry = entries[i];
     let item = strip.children[place];
     if (!item) {
-      item = document.createElement("li");
+      item = element("li");
       item.innerHTML = '<button><img alt="" loading="lazy"><span></span><span></span></button>';
       item.firstChild.addEventListener("click", () => {
         const index = Number(item.dataset.index);

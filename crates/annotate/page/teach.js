@@ -1,7 +1,7 @@
 // The third step: teaching, and its progress.
 
 import { api } from "./api.js";
-import { by, offBecause } from "./elements.js";
+import { by, element, offBecause } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
 import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
@@ -28,7 +28,7 @@ const SHAPES = [
   ["0", "Any turn: washer", '<path d="M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 5a4 4 0 1 1 0 8 4 4 0 0 1 0-8" fill-rule="evenodd"/>'],
 ];
 for (const [value, name, shape] of SHAPES) {
-  const item = document.createElement("label");
+  const item = element("label");
   item.innerHTML = `<input type="radio" name="symmetry" value="${value}"><svg viewBox="0 0 24 24" aria-hidden="true">${shape}</svg><span></span>`;
   item.lastChild.textContent = name;
   item.firstChild.checked = value === "1";
@@ -36,7 +36,7 @@ for (const [value, name, shape] of SHAPES) {
 }
 
 for (const [letter, name, says] of MODELS) {
-  const item = document.createElement("label");
+  const item = element("label");
   item.className = "model";
   item.innerHTML = `<input type="radio" name="model" value="${letter}"><span><b>${letter}</b> ${name}</span><small></small>`;
   item.lastChild.textContent = says;
@@ -149,7 +149,7 @@ function renderProgress(news) {
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
   by("validations").replaceChildren(...news.validations.map(([step, share]) => {
-    const item = document.createElement("li");
+    const item = element("li");
     item.textContent = `After ${step} steps the network alone finds ${percent(share)} of new samples`;
     return item;
   }));

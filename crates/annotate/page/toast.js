@@ -1,26 +1,21 @@
 // Notes over the picture.
 
-import { by } from "./elements.js";
+import { button, by, element } from "./elements.js";
 
 const SHOWN_MS = 3500;
 /** Notes with a button are shown longer: they must be read and reached. */
 const SHOWN_WITH_BUTTON_MS = 12000;
-/** Maximum number of sentences in one notice. */
-const MAX_SENTENCES = 4;
 
 /** Shows `text` for some seconds; with `action`, a `{ text, run }`, a button beside it. */
 export function toast(text, action = null) {
-  const note = document.createElement("p");
+  const note = element("p");
   note.textContent = text;
   by("toasts").append(note);
-  if (action) {
-    const button = Object.assign(document.createElement("button"), { textContent: action.text });
-    button.addEventListener("click", () => {
-      note.remove();
-      action.run();
-    });
-    note.append(button);
-  }
+  const act = () => {
+    note.remove();
+    action.run();
+  };
+  if (action) note.append(button(action.text, act));
   const end = () => {
     // The note stays while the pointer or the focus is on it.
     if (note.matches(":hover, :focus-within")) setTimeout(end, SHOWN_MS);
@@ -29,15 +24,11 @@ export function toast(text, action = null) {
   setTimeout(end, action ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
 }
 
-/** Shows the first of `sentences` in one note until its button is pressed, for facts that no other place shows. */
+/** Shows `sentences` in one note until its button is pressed, for facts that no other place shows. */
 export function notice(sentences) {
   if (!sentences.length) return;
-  const note = document.createElement("div");
-  const hidden = sentences.length - MAX_SENTENCES;
-  const shown = hidden > 0 ? [...sentences.slice(0, MAX_SENTENCES), `${hidden} more notes like these.`] : sentences;
-  for (const sentence of shown) note.append(Object.assign(document.createElement("p"), { textContent: sentence }));
-  const button = Object.assign(document.createElement("button"), { textContent: "OK" });
-  button.addEventListener("click", () => note.remove());
-  note.append(button);
+  const note = element("div");
+  for (const sentence of sentences) note.append(element("p", { textContent: sentence }));
+  note.append(button("OK", () => note.remove()));
   by("toasts").append(note);
 }

@@ -1,7 +1,7 @@
 // The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
 import { api } from "./api.js";
-import { button, by } from "./elements.js";
+import { button, by, element } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
@@ -180,12 +180,12 @@ async function setAbsent(target, absent) {
 }
 
 function text(tag, content, classes = "") {
-  return Object.assign(document.createElement(tag), { textContent: content, className: classes });
+  return element(tag, { textContent: content, className: classes });
 }
 
 function card(detection, i, listed, shown) {
   const count = listed.length;
-  const item = document.createElement("section");
+  const item = element("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
   const isSure = isAccepted(detection);

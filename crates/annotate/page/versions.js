@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
-import { button, by } from "./elements.js";
+import { button, by, element } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
 import { changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
@@ -98,7 +98,7 @@ async function compare() {
     else {
       const turns = state.models[Math.max(one, other)].symmetry ?? 1;
       for (const row of rows) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
-      out.replaceChildren(Object.assign(document.createElement("p"), { textContent: changesText(rows) }), table(rows));
+      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows));
     }
   } catch (error) {
     out.textContent = error.message;
@@ -106,10 +106,10 @@ async function compare() {
 }
 
 function table(rows) {
-  const made = document.createElement("table");
+  const made = element("table");
   const line = (cells, tag) => {
     const row = made.insertRow();
-    for (const cell of cells) row.append(Object.assign(document.createElement(tag), { textContent: cell }));
+    for (const cell of cells) row.append(element(tag, { textContent: cell }));
   };
   line(["Picture", ...chosen.map(number)], "th");
   const words = ({ accepted: { length }, best }, there) => {
@@ -134,23 +134,23 @@ export function renderVersions() {
   if (list.dataset.shown === wanted) return;
   list.dataset.shown = wanted;
   list.replaceChildren(...models.map((model) => {
-    const item = document.createElement("li");
+    const item = element("li");
     const grade = gradeOf(model.summary);
     item.className = grade;
     const when = new Date(model.taught_secs * 1000).toLocaleString();
-    const title = Object.assign(document.createElement("b"), { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
+    const title = element("b", { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
     const notes = [];
-    if (model.is_current) notes.push(Object.assign(document.createElement("span"), { className: "used", textContent: "in use" }));
-    const warning = (textContent) => notes.push(Object.assign(document.createElement("span"), { className: "stale", textContent }));
+    if (model.is_current) notes.push(element("span", { className: "used", textContent: "in use" }));
+    const warning = (textContent) => notes.push(element("span", { className: "stale", textContent }));
     if (GRADES[grade]) warning(GRADES[grade]);
     if (isOld(model)) warning(`stale: ${OLD}`);
     const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
-    const figures = Object.assign(document.createElement("small"), { textContent: of + briefFigures(model.summary) });
-    const row = Object.assign(document.createElement("div"), { className: "row" });
+    const figures = element("small", { textContent: of + briefFigures(model.summary) });
+    const row = element("div", { className: "row" });
     if (!model.is_current) row.append(button("Use this one", () => use(model.id)));
     if (models.length > 1) {
-      const label = Object.assign(document.createElement("label"), { className: "check" });
-      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.includes(model.id) });
+      const label = element("label", { className: "check" });
+      const box = element("input", { type: "checkbox", checked: chosen.includes(model.id) });
       box.addEventListener("change", () => {
         chosen = box.checked ? [...chosen, model.id].slice(-2) : chosen.filter((id) => id !== model.id);
         changed();
