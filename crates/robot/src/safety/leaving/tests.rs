@@ -33,9 +33,18 @@ fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
 
 /// Whether a straight motion from one tcp position to another is allowed after the descent `felt`.
 fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
+    check_within(&limits(), felt, from, to)
+}
+
+fn check_within(
+    limits: &SafetyLimits,
+    felt: Option<&FeltBelow>,
+    from: [f64; 3],
+    to: [f64; 3],
+) -> Result<(), Violation> {
     let start = at(from[0], from[1], from[2]);
     let motion = line(&start, &tcp(to[0], to[1], to[2]));
-    limits().starting_at(&start, felt).check(motion).map(|_| ())
+    limits.starting_at(&start, felt).check(motion).map(|_| ())
 }
 
 #[test]
@@ -71,6 +80,40 @@ fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
     let from = |deeper_m: f64| [x, y, LOWEST_ALLOWED_M - 0.010 - deeper_m];
     check(Some(&deep), from(0.0003), [x, y, 0.10]).unwrap();
     assert!(check(Some(&deep), from(0.0007), [x, y, 0.10]).is_err());
+}
+
+#[test]
+fn a_hand_as_high_as_allowed_need_no_longer_go_straight_up() {
+    let ([x, y], lowest_m) = (AT_M, LOWEST_ALLOWED_M - 0.004);
+    // 0.8 mm sideways on the 4 mm up to the allowed height, and 20 mm on the whole way.
+    check(Some(&felt(lowest_m)), [x, y, lowest_m], [x + 0.02, y, 0.10]).unwrap();
+    // 1.2 mm sideways on these 4 mm.
+    assert!(check(Some(&felt(lowest_m)), [x, y, lowest_m], [x + 0.03, y, 0.10]).is_err());
+}
+
+#[test]
+fn a_hand_below_only_one_of_table_and_workspace_goes_straight_up_too() {
+    let [x, y] = AT_M;
+    let mut high_floor = limits();
+    high_floor.workspace.as_mut().unwrap().min_m.z = LOWEST_ALLOWED_M + 0.010;
+    // Below the distance from the table and above the workspace's floor; then the reverse.
+    for (limits, lowest_m) in [(limits(), LOWEST_ALLOWED_M - 0.001), (high_floor, LOWEST_ALLOWED_M + 0.004)] {
+        let felt = felt(lowest_m);
+        let to = |to: [f64; 3]| check_within(&limits, Some(&felt), [x, y, lowest_m], to);
+        to([x, y, 0.10]).unwrap();
+        match to([x + 0.10, y, lowest_m]).unwrap_err() {
+            Violation::Leaving { beside_mm, down_mm, .. } => {
+                assert!((1.0..1.2).contains(&beside_mm) && (0.0..0.5).contains(&down_mm), "{beside_mm} {down_mm}");
+            }
+            error => panic!("{error}"),
+        }
+        match to([x, y, lowest_m - 0.002]).unwrap_err() {
+            Violation::Leaving { beside_mm, down_mm, .. } => {
+                assert!(beside_mm < 1.0 && (0.5..0.6).contains(&down_mm), "{beside_mm} {down_mm}");
+            }
+            error => panic!("{error}"),
+        }
+    }
 }
 
 #[test]
