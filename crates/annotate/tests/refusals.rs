@@ -137,3 +137,55 @@ fn requests_without_sense_are_told_in_one_line() {
     refused("POST", "/api/teaching", b"{\"model\": \"C\", \"time_budget_secs\": -1}", &["time limit", "-1"]);
     refused("GET", "/api/images/0/samples/0", b"", &["photo.png"]);
 }
+
+#[test]
+fn strokes_and_names_have_maximum_lengths() {
+    let served = Served::start();
+    let outline = |strokes: usize, points: usize| {
+        let points = vec!["[60, 50]"; points].join(",");
+        let strokes = vec![format!("{{\"points\": [{points}], \"is_inside\": true}}"); strokes].join(",");
+        let body = format!("{{\"box\": [40, 40, 140, 60], \"strokes\": [{strokes}]}}");
+        served.ask("POST", "/api/images/0/outline", body.as_bytes())
+    };
+    assert_eq!(outline(1, 1000).status, 200);
+    for (strokes, points) in [(101, 1), (1, 1001)] {
+        let refused = outline(strokes, points);
+        let found = format!("{strokes}, the longest of {points}");
+        assert!(refused.status == 422 && refused.text().contains(&found), "{} {}", refused.status, refused.text());
+    }
+    let rename = |letters: usize| {
+        let body = format!("{{\"label\": \"{}\"}}", "ä".repeat(letters));
+        served.ask("PUT", "/api/label", body.as_bytes())
+    };
+    assert_eq!(rename(80).status, 200);
+    let refused = rename(81);
+    assert!(refused.status == 422 && refused.text().contains("1 to 80 letters"), "{}", refused.text());
+}
+
+#[test]
+fn more_pictures_than_a_session_keeps_are_refused() {
+    let (folder, tried) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for name in ["rod.png", "other.png"] {
+        std::fs::write(folder.path().join(name), served::photo_png()).unwrap();
+    }
+    let tiny = tried.path().join("0.png");
+    image::RgbImage::new(8, 8).save(&tiny).unwrap();
+    for number in 1..500 {
+        std::fs::copy(&tiny, tried.path().join(format!("{number}.png"))).unwrap();
+    }
+    let served = Served::of_photo_and_tried(folder, "rod.png", tried.path());
+    let session = served.ask("GET", "/api/session", b"").json();
+    assert_eq!(
+        (session["others"][0]["name"].as_str(), session["trial_pictures"].as_array().unwrap().len()),
+        (Some("other.png"), 500)
+    );
+    for (path, body) in [("/api/others/0/try", Vec::new()), ("/api/trial-pictures?name=a.png", served::photo_png())] {
+        let refused = served.ask("POST", path, &body);
+        assert!(
+            refused.status == 409 && refused.text().contains("500"),
+            "{path}: {} {}",
+            refused.status,
+            refused.text()
+        );
+    }
+}
