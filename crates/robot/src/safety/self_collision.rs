@@ -75,8 +75,9 @@ mod tests {
         // The upper arm leans back, the forearm is folded onto it, and the hand points at the base.
         let folded = JointVector::from([0.0, -1.7, 0.0, -3.0, 0.0, 0.5, 0.0]);
         let found = self_collision(&panda, &panda.frames(&folded), MIN_M).unwrap();
-        assert!(found.to_string().contains("of the arm are"), "{found}");
-        println!("{found}");
+        assert!(found.distance_m < MIN_M, "{found}");
+        let near = SelfCollision { bodies: ["link 2", "hand"], distance_m: 0.0064, min_m: MIN_M };
+        assert_eq!(near.to_string(), "link 2 and hand of the arm are 6 mm apart, at least 10 mm are required");
     }
 
     /// Fewer than 30 % of the configurations in the joints' ranges are refused, and fewer than 17.5 % because of any
