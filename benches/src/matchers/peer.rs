@@ -90,6 +90,7 @@ impl PeerProcess {
         let pose = PlanarSimilarity::about(middle, Point2::new(x, y), Angle::from_degrees(degrees), 1.0);
         let outline = self.outline.transformed(&pose);
         GraspDetection {
+            demonstration_idx: 0,
             score,
             network_score: 0.0,
             agreement: None,

@@ -232,6 +232,7 @@ mod tests {
     #[test]
     fn tags_of_refused_ones_do_not_cover_each_other() {
         let detection = |x: f64, score: f64| GraspDetection {
+            demonstration_idx: 0,
             score,
             network_score: 0.0,
             agreement: Some(0.4),

@@ -12,8 +12,8 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_camera::LatestFrame;
 use sdg_geometry::Polygon;
-use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verification};
-use sdg_robot::height::{MeasuredHeight, Sighting};
+use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Lengths, Verification};
+use sdg_robot::height::{GivenHeight, MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
 use crate::mounted_camera::MountedCamera;
@@ -172,19 +172,24 @@ impl<P> ModelFinder<P> {
         self.seen.as_ref()
     }
 
-    /// Finds the part for a plan, without measuring the part's height. Searches first for parts on a surface at
-    /// [`MountedCamera::table_height_m`]. If no detection there is sure and [`Self::with_heights`] has set a range,
-    /// takes a second picture and searches the whole range.
+    /// Finds the part for a plan, without measuring the part's height. Searches first for parts whose marks are at the
+    /// height `told`, or without it on a surface at [`MountedCamera::table_height_m`]. If no detection there is sure
+    /// and [`Self::with_heights`] has set a range, takes a second picture and searches the whole range.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].
-    pub fn find_for_plan<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>>
+    pub fn find_for_plan<A: Arm>(
+        &mut self,
+        arm: &mut A,
+        told: Option<&GivenHeight>,
+    ) -> sdg_robot::Result<Option<GraspTarget>>
     where
         P: Pictures<A>,
     {
         let is_sure = |target: &GraspTarget| target.score >= sdg_robot::SURE;
+        let higher_m = told.map_or(0.0, |told| told.height_m - self.marks_z_m(self.camera.table_height_m));
         let heights_m = self.heights_m.take();
-        let found = self.find(arm).map(|found| found.filter(is_sure));
+        let found = self.find_best(arm, higher_m).map(|found| found.filter(is_sure));
         self.heights_m = heights_m;
         match found? {
             None if self.heights_m.is_some() => Ok(self.find(arm)?.filter(is_sure)),
@@ -192,14 +197,30 @@ impl<P> ModelFinder<P> {
         }
     }
 
-    /// All parts in a picture, best first.
-    fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
+    /// The best part that does not lie in a place, if parts lie `higher_m` above the table.
+    fn find_best<A: Arm>(&mut self, arm: &mut A, higher_m: f64) -> sdg_robot::Result<Option<GraspTarget>>
+    where
+        P: Pictures<A>,
+    {
+        let found = self.find_all(arm, higher_m)?;
+        let is_placed = |target: &GraspTarget| {
+            let p = target.base_from_tcp.translation;
+            self.places.iter().any(|place| place.covers([p.x, p.y]))
+        };
+        let best = found.iter().copied().find(|target| !is_placed(target));
+        self.keep_others(found, best.as_ref());
+        Ok(best)
+    }
+
+    /// All parts in a picture, best first. Assumes that they lie `higher_m` above the table, or at a height of the range
+    /// of [`Self::with_heights`].
+    fn find_all<A: Arm>(&mut self, arm: &mut A, higher_m: f64) -> sdg_robot::Result<Vec<GraspTarget>>
     where
         P: Pictures<A>,
     {
         self.sights.clear();
         let heights_m = self.heights_m.clone();
-        let sightings = self.look(arm, 0.0, heights_m.as_ref())?;
+        let sightings = self.look(arm, higher_m, heights_m.as_ref())?;
         if heights_m.is_none() {
             return Ok(sightings.iter().map(|sighting| sighting.target).collect());
         }
@@ -236,7 +257,8 @@ impl<P> ModelFinder<P> {
         let mut camera_over_table = self.camera.over_table(&arm.geometry().base_from_flange(&state.q));
         camera_over_table.table_height_m += higher_m;
         self.perception.move_to(&camera_over_table)?;
-        let distance_m = camera_over_table.camera.world_from_camera.translation.z - self.marks_z_m(&camera_over_table);
+        let distance_m =
+            camera_over_table.camera.world_from_camera.translation.z - self.marks_z_m(camera_over_table.table_height_m);
         self.perception.set_sizes(heights_m.map(|heights_m| {
             // A higher part is nearer to the camera and appears larger.
             let size =
@@ -251,16 +273,20 @@ impl<P> ModelFinder<P> {
         Ok(sightings)
     }
 
-    /// z of the marks of a part that lies on the table, in metres.
-    fn marks_z_m(&self, camera_over_table: &CameraOverTable) -> f64 {
-        camera_over_table.table_height_m
-            + self.perception.model().facts().lengths.map_or(0.0, |lengths| lengths.mark_height_m)
+    /// The lengths of the model.
+    fn lengths(&self) -> Option<&Lengths> {
+        self.perception.model().facts().lengths.as_ref()
+    }
+
+    /// z of the marks of a part on a surface at this z, in metres.
+    fn marks_z_m(&self, surface_z_m: f64) -> f64 {
+        surface_z_m + self.lengths().map_or(0.0, |lengths| lengths.mark_height_m)
     }
 
     /// Converts a detection to a sighting in the plane of the marks.
     fn sighting(&self, found: &Found, camera_over_table: &CameraOverTable) -> Option<Sighting> {
         let target = target(found)?;
-        let marks_z_m = self.marks_z_m(camera_over_table);
+        let marks_z_m = self.marks_z_m(camera_over_table.table_height_m);
         let seen_middle = found.detection.outline.as_ref().map(Polygon::centroid);
         let middle_m = match seen_middle {
             Some(pixel) => camera_over_table.camera.at_height(&pixel, marks_z_m)?,
@@ -284,7 +310,7 @@ impl<P> ModelFinder<P> {
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
         let model = self.perception.model();
-        let pixels_per_m = model.facts().lengths?.pixels_per_m;
+        let pixels_per_m = self.lengths()?.pixels_per_m;
         let widths_px = model.demonstrations().iter().map(|demonstration| demonstration.marks.width_px);
         let width_px = model.demonstrations().first()?.marks.width_px;
         let is_one_size =
@@ -294,7 +320,7 @@ impl<P> ModelFinder<P> {
 
     fn outline_of(&self, found: &Found, camera_over_table: &CameraOverTable) -> Option<SeenOutline> {
         let table_m = camera_over_table.table_height_m;
-        let mark_m = self.marks_z_m(camera_over_table);
+        let mark_m = self.marks_z_m(table_m);
         let on_plane = |pixel| camera_over_table.camera.at_height(pixel, mark_m).map(|p_in_base| p_in_base.xy());
         let corners = &found.detection.outline.as_ref()?.vertices;
         let outline_in_base = corners.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
@@ -320,7 +346,7 @@ impl<P> ModelFinder<P> {
 
     /// Measures the height of the surface beside a part in two of the kept pictures.
     fn surface_of(&self, pair: &[Sighting; 2], expected: &MeasuredHeight) -> Option<MeasuredHeight> {
-        let lengths = self.perception.model().facts().lengths?;
+        let lengths = self.lengths()?;
         let kept = |sighting: &Sighting| {
             let shows = |(shown, _): &&(Sighting, Polygon)| shown == sighting;
             self.sights.iter().find_map(|sights| Some((&sights.picture, &sights.parts.iter().find(shows)?.1)))
@@ -362,21 +388,14 @@ fn target(found: &Found) -> Option<GraspTarget> {
 
 impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
     fn find(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>> {
-        let found = self.find_all(arm)?;
-        let is_placed = |target: &GraspTarget| {
-            let p = target.base_from_tcp.translation;
-            self.places.iter().any(|place| place.covers([p.x, p.y]))
-        };
-        let best = found.iter().copied().find(|target| !is_placed(target));
-        self.keep_others(found, best.as_ref());
-        Ok(best)
+        self.find_best(arm, 0.0)
     }
 
     fn find_nearest(&mut self, arm: &mut A, base_from_tcp: &Isometry3<f64>) -> sdg_robot::Result<Option<GraspTarget>> {
         let apart_m = |target: &GraspTarget| {
             (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
         };
-        let found = self.find_all(arm)?;
+        let found = self.find_all(arm, 0.0)?;
         let sure = found.iter().copied().filter(|target| target.score >= sdg_robot::SURE);
         let nearest = sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)));
         self.keep_others(found, nearest.as_ref());
@@ -384,8 +403,7 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
     }
 
     fn sight(&mut self, arm: &mut A, expected: &GraspTarget) -> sdg_robot::Result<Vec<Sighting>> {
-        let lengths = self.perception.model().facts().lengths;
-        let grasp_height_m = lengths.map_or(0.0, |lengths| lengths.grasp_height_m);
+        let grasp_height_m = self.lengths().map_or(0.0, |lengths| lengths.grasp_height_m);
         let expected_at = expected.base_from_tcp.translation;
         let higher_m = expected_at.z - grasp_height_m - self.camera.table_height_m;
         let heights_m = higher_m - HEIGHT_BY_SIZE_SIGMA_M..=higher_m + HEIGHT_BY_SIZE_SIGMA_M;

@@ -65,6 +65,11 @@ impl GraspTask {
         Self { workcell, model, camera, config, place }
     }
 
+    /// The given height of the marks, if the camera measures heights.
+    pub fn told(&self) -> Option<&GivenHeight> {
+        self.config.height.as_ref()?.told.as_ref()
+    }
+
     /// Checks that the place has room for the part and the fingers.
     ///
     /// # Errors

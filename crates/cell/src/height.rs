@@ -13,7 +13,7 @@ pub fn height_measurement(
     camera: &MountedCamera,
     told: Option<GivenHeight>,
 ) -> Option<HeightMeasurement> {
-    let lengths = model.facts().lengths?;
+    let lengths = model.facts().lengths.as_ref()?;
     let measurement = HeightMeasurement::new(lengths.mark_height_m, lengths.grasp_height_m);
     matches!(camera.pose, CameraPose::OnFlange(_)).then_some(HeightMeasurement { told, ..measurement })
 }
@@ -22,7 +22,7 @@ impl MountedCamera {
     /// For a camera beside the robot: replaces the model's height above the table by the given height of the marks (z
     /// in the base frame, in metres). A camera on the hand measures the height instead.
     pub fn with_marks_at(self, model: &GraspModel, told: Option<&GivenHeight>) -> Self {
-        match (self.pose, model.facts().lengths, told) {
+        match (self.pose, &model.facts().lengths, told) {
             (CameraPose::InBase(_), Some(lengths), Some(told)) => {
                 Self { table_height_m: told.height_m - lengths.mark_height_m, ..self }
             }

@@ -7,7 +7,7 @@ use sdg_robot::PartShape;
 /// The part's shape, if the model knows lengths and its first demonstration has an outline; otherwise `None`: the
 /// sequence then assumes a shape from the part's width between the fingers.
 pub fn part_shape(model: &GraspModel) -> Option<PartShape> {
-    let lengths = model.facts().lengths?;
+    let lengths = model.facts().lengths.as_ref()?;
     let marks = &model.demonstrations().first()?.marks;
     let outline = marks.outline.as_ref()?;
     let (start, end) = (marks.grasp.start, marks.grasp.end);

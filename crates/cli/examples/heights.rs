@@ -101,7 +101,7 @@ fn taught(spec: &ObjectSpec) -> Result<GraspModel, Box<dyn Error>> {
     let ObjectSpec { mark_height_m, grasp_height_m, .. } = *spec;
     let middle = Point2::new(320.0, 240.0);
     let metres_per_pixel = camera.metres_per_pixel(&middle, mark_height_m).ok_or("marks above the camera")?;
-    let lengths = Lengths { pixels_per_m: 1.0 / metres_per_pixel, mark_height_m, grasp_height_m, slant: [0.0; 2] };
+    let lengths = Lengths::of_level_photos(1.0 / metres_per_pixel, mark_height_m, grasp_height_m);
     Ok(taught.model.with_lengths(lengths, f64::INFINITY)?)
 }
 

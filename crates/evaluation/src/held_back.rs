@@ -96,7 +96,7 @@ impl HeldBackFigures {
             };
             let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
             // The demonstrations of a model that knows lengths are plan views, whose pixel size is uniform.
-            let metres_per_pixel = facts.lengths.map(|lengths| photo_px / lengths.pixels_per_m);
+            let metres_per_pixel = facts.lengths.as_ref().map(|lengths| photo_px / lengths.pixels_per_m);
             let truth = |instance: &Instance| {
                 let mut truth = Truth::new(instance, &detector);
                 if let Some(grasp) = &mut truth.grasp {

@@ -76,7 +76,7 @@ impl OwnPart {
         sizes: &OwnPartSizes,
         in_words: &dyn Fn(Assumption) -> &'static str,
     ) -> Result<Self> {
-        let known = model.facts().lengths;
+        let known = model.facts().lengths.as_ref();
         let demonstration = model.demonstrations()[0].clone();
         let marks = &demonstration.marks;
         let region = marks.region();
@@ -137,12 +137,8 @@ impl OwnPart {
         let model = match known {
             Some(_) => model,
             None => {
-                let lengths = Lengths {
-                    pixels_per_m: 1.0 / metres_per_pixel,
-                    mark_height_m: object.mark_height_m,
-                    grasp_height_m: object.grasp_height_m,
-                    slant: [0.0; 2],
-                };
+                let (mark, grasp) = (object.mark_height_m, object.grasp_height_m);
+                let lengths = Lengths::of_level_photos(1.0 / metres_per_pixel, mark, grasp);
                 model.with_lengths(lengths, MAX_PIXELS_PER_M).with_context(|| model_file.to_owned())?
             }
         };

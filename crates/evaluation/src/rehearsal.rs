@@ -253,13 +253,13 @@ impl Rehearsal<'_> {
     /// Invalid lengths.
     fn told_model(&self, number: usize) -> Result<GraspModel> {
         let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let known = self.model.facts().lengths;
-        let lengths = known.map_or_else(|| self.lengths_of_demonstration(), Ok)?;
-        let mark_height_m = lengths.mark_height_m + sign * self.errors.mark_height_m;
-        if known == Some(Lengths { mark_height_m, ..lengths }) {
+        let known = &self.model.facts().lengths;
+        let mut lengths = known.clone().map_or_else(|| self.lengths_of_demonstration(), Ok)?;
+        lengths.mark_height_m += sign * self.errors.mark_height_m;
+        if known.as_ref() == Some(&lengths) {
             return Ok(self.model.clone());
         }
-        Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
+        Ok(self.model.clone().with_lengths(lengths, f64::INFINITY)?)
     }
 
     /// The lengths of a model that was taught from a shipped photo without a plan view. They follow from the camera of
@@ -270,7 +270,7 @@ impl Rehearsal<'_> {
         let middle = Point2::new(f64::from(camera.intrinsics.width), f64::from(camera.intrinsics.height)) / 2.0;
         let metres_per_pixel =
             camera.metres_per_pixel(&middle, mark_height_m).context("the marks lie above the camera")?;
-        Ok(Lengths { pixels_per_m: 1.0 / metres_per_pixel, mark_height_m, grasp_height_m, slant: [0.0; 2] })
+        Ok(Lengths::of_level_photos(1.0 / metres_per_pixel, mark_height_m, grasp_height_m))
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {

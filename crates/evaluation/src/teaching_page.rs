@@ -139,7 +139,7 @@ impl TeachingPage<'_> {
 
 /// The photos, the marked photos, and samples made from them.
 pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
-    let as_seen = match model.facts().lengths {
+    let as_seen = match &model.facts().lengths {
         None => "As taken by the camera.",
         Some(_) => "The picture in the plan view: x of the camera's frame points to the right.",
     };

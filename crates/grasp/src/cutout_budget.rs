@@ -6,7 +6,7 @@ use sdg_demonstration::ImageLimits;
 
 use crate::error::{GraspError, Result};
 use crate::taught::MARGIN_PX;
-use crate::taught_marks::TaughtMarks;
+use crate::taught_marks::{TaughtMarks, extent};
 
 /// Maximum number of demonstrations of a model, far above practical use.
 pub(crate) const MAX_DEMONSTRATIONS: usize = 100;
@@ -42,13 +42,10 @@ impl CutoutBudget {
         let long = marks.bbox.width().max(marks.bbox.height());
         // A cut-out may have been enlarged with its margin, if another photo shows the part larger.
         let margin = 2.0 * (MARGIN_PX + 2.0) * (long / MIN_PART_PX).max(1.0);
-        let ends = [marks.grasp.start, marks.grasp.end];
-        let side = |axis: usize, from: f64, to: f64| {
-            ends.iter().fold(to, |to, end| to.max(end[axis])) - ends.iter().fold(from, |from, end| from.min(end[axis]))
-        };
-        let [width, height] = [side(0, marks.bbox.x1, marks.bbox.x2), side(1, marks.bbox.y1, marks.bbox.y2)];
+        let extent = extent(&marks.bbox, &marks.grasp);
         // Infinite or too large numbers become the budget.
-        ImageLimits { max_pixels: (((width + margin) * (height + margin)) as u64).min(self.pixels) }
+        let pixels = ((extent.width() + margin) * (extent.height() + margin)) as u64;
+        ImageLimits { max_pixels: pixels.min(self.pixels) }
     }
 
     /// Subtracts a cut-out.

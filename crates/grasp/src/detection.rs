@@ -17,6 +17,8 @@ use crate::verification::PlacedDemonstration;
 /// One grasp found in an image; positions are in pixels of the given image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspDetection {
+    /// Index of the demonstration that was found.
+    pub demonstration_idx: usize,
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
     /// The network's score, in `[0, 1]`; zero if no candidate of the network led to the detection (model S, and parts
@@ -119,10 +121,11 @@ impl Placement {
 impl Sighting<'_> {
     /// The detection at the pose of the demonstration.
     pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
-        let PlacedDemonstration { demonstration, image_from_marks, agreement, .. } = self.placed;
+        let PlacedDemonstration { demonstration, demonstration_idx, image_from_marks, agreement, .. } = self.placed;
         let outline = self.placed.outline();
         let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
         GraspDetection {
+            demonstration_idx,
             score,
             network_score: self.network_score,
             agreement: Some(agreement),

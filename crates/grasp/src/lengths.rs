@@ -10,7 +10,7 @@ const MAX_PIXELS_PER_M: f64 = 1e6;
 const MAX_HEIGHT_M: f64 = 2.0;
 
 /// The lengths of a model for calibrated cameras.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lengths {
     /// Pixels of the demonstrations per metre.
     pub pixels_per_m: f64,
@@ -22,20 +22,48 @@ pub struct Lengths {
     /// versions.
     #[serde(default)]
     pub slant: [f64; 2],
+    /// The same for the further photos, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further_slants: Vec<[f64; 2]>,
+    /// The height of the compared edges; `None` if it was not measured, as with one photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edges: Option<EdgeHeight>,
+}
+
+/// The mean height of the compared edges above the plane of the marks.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct EdgeHeight {
+    /// Height, in metres.
+    pub height_m: f64,
+    /// Standard deviation, in metres.
+    pub sigma_m: f64,
 }
 
 impl Lengths {
+    /// The lengths of photos that were taken vertically from above.
+    pub fn of_level_photos(pixels_per_m: f64, mark_height_m: f64, grasp_height_m: f64) -> Self {
+        let slant = [0.0; 2];
+        Self { pixels_per_m, mark_height_m, grasp_height_m, slant, further_slants: Vec::new(), edges: None }
+    }
+
+    /// The direction from which a demonstration's photo shows the part.
+    pub(crate) fn slant_of(&self, demonstration_idx: usize) -> [f64; 2] {
+        let further = demonstration_idx.checked_sub(1).and_then(|idx| self.further_slants.get(idx));
+        *further.unwrap_or(&self.slant)
+    }
+
     /// Checks that the values are possible.
     ///
     /// # Errors
     /// [`GraspError::Damaged`] for impossible values.
     pub(crate) fn check(&self) -> Result<()> {
-        let Self { pixels_per_m, mark_height_m, grasp_height_m, slant } = *self;
+        let Self { pixels_per_m, mark_height_m, grasp_height_m, edges, .. } = *self;
         let is_height = |height: f64| (0.0..MAX_HEIGHT_M).contains(&height);
         if (1.0..MAX_PIXELS_PER_M).contains(&pixels_per_m)
             && is_height(mark_height_m)
             && is_height(grasp_height_m)
-            && slant.iter().all(|share| share.is_finite())
+            && edges.is_none_or(|edges| edges.height_m.abs() < MAX_HEIGHT_M && is_height(edges.sigma_m))
+            && self.further_slants.iter().chain([&self.slant]).flatten().all(|share| share.is_finite())
         {
             return Ok(());
         }

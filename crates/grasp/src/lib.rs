@@ -110,7 +110,7 @@ pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
 pub use evidence_kind::{Advice, EvidenceKind};
 pub use facts::{ModelKind, NegativeFacts, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
-pub use lengths::Lengths;
+pub use lengths::{EdgeHeight, Lengths};
 pub use model::{GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use network_calibration::NetworkCalibration;

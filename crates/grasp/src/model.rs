@@ -296,6 +296,7 @@ impl GraspModel {
 
     fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {
         GraspDetection {
+            demonstration_idx: candidate.demonstration_idx,
             score: self.score_calibration.network.apply(candidate.network_score),
             network_score: candidate.network_score,
             agreement: None,
@@ -389,6 +390,7 @@ mod tests {
 
     fn detection(x: f64, score: f64, network_score: f64) -> GraspDetection {
         GraspDetection {
+            demonstration_idx: 0,
             score,
             network_score,
             agreement: Some(score),

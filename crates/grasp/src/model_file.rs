@@ -130,7 +130,7 @@ impl GraspModel {
         check_count(marks.len())?;
         let mut facts: TeachingFacts = metadata.json("teaching")?;
         let region = facts.region.take();
-        if let Some(lengths) = facts.lengths {
+        if let Some(lengths) = &facts.lengths {
             lengths.check()?;
         }
         let mut budget = CutoutBudget::default();

@@ -77,6 +77,7 @@ mod tests {
     fn names_and_units_are_as_documented() {
         let bbox = BoundingBox { x1: 1.0, y1: 2.0, x2: 3.0, y2: 4.0 };
         let detection = GraspDetection {
+            demonstration_idx: 0,
             score: 0.75,
             network_score: 0.5,
             agreement: None,

@@ -124,6 +124,7 @@ fn places_where_a_refused_part_differs_are_places_of_the_picture() {
 fn half_of_a_part_and_its_grasp_point_decide() {
     let region = SearchRegion::new([100, 50, 60, 40]);
     let detection = |x: f64, y: f64| GraspDetection {
+        demonstration_idx: 0,
         score: 0.9,
         network_score: 0.0,
         agreement: None,

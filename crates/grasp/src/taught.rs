@@ -12,7 +12,7 @@ use crate::colors::{Colors, gray};
 use crate::decimal::decimal;
 use crate::prepared::{Prepared, PreparedSizes, WorkingSize};
 use crate::sizes::SizeRange;
-use crate::taught_marks::TaughtMarks;
+use crate::taught_marks::{TaughtMarks, extent};
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Margin in pixels around the part, so that gradients at the outline use both sides. Chosen by hand, not measured.
@@ -48,13 +48,9 @@ impl TaughtDemonstration {
         let grasp = *demonstration.annotation.require_grasp()?;
         demonstration.annotation.check()?;
         let (width, height) = demonstration.image.dimensions();
-        let cut = BoundingBox {
-            x1: bbox.x1.min(grasp.start.x).min(grasp.end.x) - MARGIN_PX,
-            y1: bbox.y1.min(grasp.start.y).min(grasp.end.y) - MARGIN_PX,
-            x2: bbox.x2.max(grasp.start.x).max(grasp.end.x) + MARGIN_PX,
-            y2: bbox.y2.max(grasp.start.y).max(grasp.end.y) + MARGIN_PX,
-        }
-        .clip(f64::from(width), f64::from(height));
+        let BoundingBox { x1, y1, x2, y2 } = extent(bbox, &grasp);
+        let cut = BoundingBox { x1: x1 - MARGIN_PX, y1: y1 - MARGIN_PX, x2: x2 + MARGIN_PX, y2: y2 + MARGIN_PX }
+            .clip(f64::from(width), f64::from(height));
         let (left, top) = (cut.x1.floor(), cut.y1.floor());
         let (right, bottom) = (cut.x2.ceil(), cut.y2.ceil());
         let cutout = image::imageops::crop_imm(

@@ -26,6 +26,17 @@ pub struct TaughtMarks {
     pub photo_middle: Option<[f64; 2]>,
 }
 
+/// The box around a part and its grasp line.
+pub(crate) fn extent(bbox: &BoundingBox, grasp: &GraspLine) -> BoundingBox {
+    let GraspLine { start, end } = grasp;
+    BoundingBox {
+        x1: bbox.x1.min(start.x).min(end.x),
+        y1: bbox.y1.min(start.y).min(end.y),
+        x2: bbox.x2.max(start.x).max(end.x),
+        y2: bbox.y2.max(start.y).max(end.y),
+    }
+}
+
 impl TaughtMarks {
     /// The outline; the box if none was drawn.
     pub fn region(&self) -> Polygon {

@@ -200,6 +200,21 @@ impl<'a> SizedDemonstration<'a> {
         !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + MIN_GAIN_BEYOND_END
     }
 
+    /// The pose `refined` by edges from `start`, refined further by edges and surface; `None` if its size is outside
+    /// the search range.
+    fn refined(
+        &self,
+        view: &View<'_>,
+        start: &PlanarSimilarity,
+        refined: PlanarSimilarity,
+    ) -> Option<PlacedDemonstration<'a>> {
+        let comparison = self.prepared.search.comparison(&view.picture());
+        let scales = self.prepared.search.scales();
+        let refined = comparison.best_turn(&comparison.refine_pose(start, refined, scales), scales);
+        let agreement = comparison.agreement(&refined).both();
+        scales.contains(&refined.scale).then(|| self.placed(view, &refined, agreement, comparison.evidence(&refined)))
+    }
+
     fn placed(
         &self,
         view: &View<'_>,
@@ -311,10 +326,21 @@ fn better_way_round<'a>(
         (start, refined, comparison.agreement(&refined).both())
     });
     let (start, refined, _) = if turned.2 > straight.2 { turned } else { straight };
-    let scales = sized.prepared.search.scales();
-    let refined = comparison.best_turn(&comparison.refine_pose(&start, refined, scales), scales);
-    let agreement = comparison.agreement(&refined).both();
-    scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
+    sized.refined(view, &start, refined)
+}
+
+/// The first demonstration laid over the image, refined from a pose; `None` if the size of the refined pose is outside
+/// the search range.
+#[cfg(feature = "teach")]
+pub(crate) fn refined_from<'a>(
+    searched: &SearchedImage<'a>,
+    image_from_cutout: &PlanarSimilarity,
+) -> Option<PlacedDemonstration<'a>> {
+    let sized = searched.sized_for(0, image_from_cutout.scale)?;
+    let view = &searched.views[sized.view_idx];
+    let start = sized.view_from_working(image_from_cutout);
+    let refined = sized.prepared.search.comparison(&view.picture()).refined_by_edges(&start);
+    sized.refined(view, &start, refined)
 }
 
 /// The shortening of a placed demonstration, and the direction of the shortening in the image; `None` as for

@@ -1,4 +1,4 @@
-//! An error and its causes as one line.
+//! Lines of messages: an error and its causes, and lists of names.
 
 /// Joins the error and its causes to one line. A cause is left out if the text so far contains it already.
 pub fn one_line(error: &anyhow::Error) -> String {
@@ -14,11 +14,27 @@ pub fn one_line(error: &anyhow::Error) -> String {
     line
 }
 
+/// The first `most` names, and the number of the others.
+pub fn first_names(names: &[String], most: usize) -> String {
+    match names.split_at_checked(most) {
+        Some((first, others @ [_, ..])) => format!("{}, {} more", first.join(", "), others.len()),
+        _ => names.join(", "),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use anyhow::Context;
     use std::io;
+
+    #[test]
+    fn long_lists_end_with_the_number_of_the_others() {
+        let names: Vec<String> = (1..=5).map(|number| format!("{number}.png")).collect();
+        assert_eq!(first_names(&names, 3), "1.png, 2.png, 3.png, 2 more");
+        assert_eq!(first_names(&names[..3], 3), "1.png, 2.png, 3.png");
+        assert_eq!(first_names(&[], 3), "");
+    }
 
     #[test]
     fn causes_follow_each_other_once() {

@@ -51,7 +51,7 @@ pub use annotation_files::MAX_ANNOTATION_BYTES;
 pub use board_pictures::{BoardPicture, read_board};
 pub use camera_update::CameraUpdate;
 pub use error::{ConfigError, ImageError, NotAPair};
-pub use error_line::one_line;
+pub use error_line::{first_names, one_line};
 pub use models::{check_replaces_a_model, read_model};
 pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};
 pub use pictures::{

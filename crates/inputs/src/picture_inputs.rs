@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{IMAGE_EXTENSIONS, PixelFrame};
 
+use crate::error_line::first_names;
 use crate::pictures::{UNREADABLE_EXTENSIONS, read_image_in, read_standard_input_image};
 
 /// The name that stands for standard input.
@@ -87,11 +88,9 @@ pub fn pictures_of_argument(argument: &Path) -> Result<PictureInputs> {
     }
     let skipped = (!others.is_empty()).then(|| {
         let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let mut names: Vec<String> = others.iter().take(MAX_NAMED).map(name).collect();
-        if others.len() > MAX_NAMED {
-            names.push(format!("{} more", others.len() - MAX_NAMED));
-        }
-        format!("{}: skipped files that are not pictures: {}", argument.display(), names.join(", "))
+        let names: Vec<String> = others.iter().map(name).collect();
+        let names = first_names(&names, MAX_NAMED);
+        format!("{}: skipped files that are not pictures: {names}", argument.display())
     });
     Ok(PictureInputs { pictures: pictures.into_iter().map(PictureInput::File).collect(), skipped })
 }

@@ -195,7 +195,8 @@ fn planned(
     finder: &mut ModelFinder<TopicPictures>,
 ) -> GraspResponse {
     let refused = |message: String| GraspResponse { message, step: "detect".to_owned(), ..GraspResponse::default() };
-    let seen = arm.state().and_then(|state| Ok((state, arm.hand()?, finder.find_for_plan(arm)?)));
+    let seen =
+        arm.state().and_then(|state| Ok((state, arm.hand()?, finder.find_for_plan(arm, settings.told.as_ref())?)));
     let (state, hand, target) = match seen {
         Ok((state, hand, Some(target))) => (state, hand, target),
         Ok(_) => return refused("the part was not found".to_owned()),

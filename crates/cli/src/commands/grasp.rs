@@ -192,7 +192,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
 ) -> Result<Outcome> {
     let mut finder = task.finder(pictures);
     if args.dry_run {
-        let target = finder.find_for_plan(arm)?;
+        let target = finder.find_for_plan(arm, task.told())?;
         dry_run(args, task, arm, limits.clone(), target, finder.seen())?;
     }
     if args.dry_run || address.is_some() {

@@ -14,7 +14,7 @@ use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_evaluation::{TaughtFile, taught_words};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
-use sdg_inputs::{TeachingFiles, base_weights};
+use sdg_inputs::{TeachingFiles, base_weights, first_names};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
@@ -125,6 +125,9 @@ const SHIPPED_FILE: &str = "crates/grasp/weights/edge.safetensors";
 /// Value of `--base-weights` for random initialisation.
 const NO_BASE_WEIGHTS: &str = "none";
 
+/// Maximum number of photos named in the line of an error.
+const MAX_NAMED: usize = 3;
+
 /// The teaching options, except for the demonstrations and the initial weights.
 pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     let mut options = TeachOptions::new(args.seed);
@@ -185,7 +188,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             let picture = args.negatives[number - 1].display();
             Usage(format!("--negative: expected a picture without the part, found the demonstration {picture}")).into()
         }
-        Some(_) => error.context(args.demonstrations.join(", ")),
+        Some(_) => error.context(first_names(&args.demonstrations, MAX_NAMED)),
         None => error,
     })?;
     let TaughtFile { taught, bytes, .. } = file;
@@ -249,13 +252,16 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
                 -log_odds
             );
         }
-        if let Some(lengths) = facts.lengths {
+        if let Some(lengths) = &facts.lengths {
             println!(
                 "size of the part: {:.3} mm per pixel of the photo; marks {:.1} mm above the table; grasped {:.1} mm above the table",
                 1e3 / lengths.pixels_per_m,
                 1e3 * lengths.mark_height_m,
                 1e3 * lengths.grasp_height_m
             );
+        }
+        if let Some(told) = taught_words::edges(&taught.model) {
+            println!("{told}");
         }
         if let Some(warning) = taught_words::too_wide(&taught.model) {
             eprintln!("{warning}");

@@ -170,6 +170,7 @@ mod tests {
         let bbox = BoundingBox { x1: 260.0, y1: 170.0, x2: 340.0, y2: 230.0 };
         let found = center + Rotation2::new(angle.radians()) * Vector2::new(along, across);
         let detection = GraspDetection {
+            demonstration_idx: 0,
             score: 0.9,
             network_score: 0.9,
             agreement: None,

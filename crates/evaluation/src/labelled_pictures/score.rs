@@ -387,6 +387,7 @@ mod tests {
 
     fn detection(x: f64, degrees: f64, score: f64) -> GraspDetection {
         GraspDetection {
+            demonstration_idx: 0,
             score,
             network_score: score,
             agreement: None,

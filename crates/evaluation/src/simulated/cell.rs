@@ -102,17 +102,21 @@ pub enum Marks {
     Shipped,
     /// The marks of the shipped demonstration, moved by `MARKS_JITTER_PX`.
     Jittered,
-    /// The marks of the shipped demonstration, in the plan view of the camera that took it.
-    InPlanView,
+    /// The marks of the shipped demonstration, and of further photos by the same camera, in its plan view.
+    InPlanView {
+        /// Number of all photos.
+        photos: u32,
+    },
 }
 
 impl Marks {
     /// Suffix in file names.
-    fn suffix(self) -> &'static str {
+    fn suffix(self) -> String {
         match self {
-            Self::Shipped => "",
-            Self::Jittered => "-jittered-marks",
-            Self::InPlanView => "-plan-view",
+            Self::Shipped => String::new(),
+            Self::Jittered => "-jittered-marks".to_owned(),
+            Self::InPlanView { photos: 1 } => "-plan-view".to_owned(),
+            Self::InPlanView { photos } => format!("-plan-view-{photos}-photos"),
         }
     }
 }

@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Annotation, Demonstration};
 use sdg_grasp::{CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above};
 use sdg_inputs::one_line;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::views::demonstration_view;
+use sdg_simulation::views::{DemonstrationView, demonstration_view, demonstration_view_at};
 
 use super::cell::{Cell, Marks};
 use super::jitter::{MARKS_JITTER_PX, with_jittered_marks};
@@ -18,6 +18,11 @@ use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::shipped;
 use crate::taught_file::TaughtFile;
+
+/// Places of the part in further photos: near the borders of the picture, where the lines of sight are inclined by 18°.
+const FURTHER_PLACES: [(f64, f64, f64); 2] = [(0.5, 0.18, 0.9), (0.5, -0.18, 2.5)];
+/// Maximum number of photos from which a part is taught.
+pub const MAX_PHOTOS: u32 = 1 + FURTHER_PLACES.len() as u32;
 
 /// The settings for teaching networks.
 pub(super) struct Teaching<'a> {
@@ -43,14 +48,14 @@ impl Teaching<'_> {
         let settings = self.store.settings();
         let object = ObjectSpec::by_name(cell.object)?;
         let shipped = shipped::demonstration(cell.object)?;
-        let (demonstration, lengths) = match marks {
-            Marks::Shipped => (shipped, None),
+        let (demonstrations, lengths) = match marks {
+            Marks::Shipped => (vec![shipped], None),
             Marks::Jittered => {
-                (with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object)), None)
+                (vec![with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object))], None)
             }
-            Marks::InPlanView => {
-                let (demonstration, lengths) = in_plan_view(&object, shipped)?;
-                (demonstration, Some(lengths))
+            Marks::InPlanView { photos } => {
+                let (demonstrations, lengths) = in_plan_view(&object, shipped, photos)?;
+                (demonstrations, Some(lengths))
             }
         };
         let mut options = TeachOptions::new(settings.seed);
@@ -66,7 +71,7 @@ impl Teaching<'_> {
             interrupted |= is_interrupted();
             if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let file = caught(|| Ok(TaughtFile::teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
+        let file = caught(|| Ok(TaughtFile::teach(&demonstrations, &options, &mut observe)?));
         if interrupted {
             return Ok(None);
         }
@@ -96,12 +101,27 @@ impl Teaching<'_> {
     }
 }
 
-/// The shipped demonstration in the plan view of the simulator's camera, which took it.
-fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstration, Lengths)> {
+/// The shipped demonstration and further ones, in the plan view of the simulator's camera, which took all of them.
+fn in_plan_view(object: &ObjectSpec, shipped: Demonstration, photos: u32) -> Result<(Vec<Demonstration>, Lengths)> {
     let camera = demonstration_view(object)?.view.camera;
     let over_table = CameraOverTable { camera, table_height_m: 0.0, workspace: None };
-    let (mut seen, lengths) = seen_from_above(&[shipped], &over_table, object.mark_height_m, object.grasp_height_m)?;
-    Ok((seen.remove(0), lengths))
+    let mut demonstrations = vec![shipped];
+    for place in FURTHER_PLACES.into_iter().take(photos as usize - 1) {
+        demonstrations.push(further_photo(object, &demonstrations[0], place)?);
+    }
+    Ok(seen_from_above(&demonstrations, &over_table, object.mark_height_m, object.grasp_height_m)?)
+}
+
+/// A photo of the part at another place (x, y in metres and yaw in radians), marked as the shipped one.
+fn further_photo(object: &ObjectSpec, shipped: &Demonstration, place: (f64, f64, f64)) -> Result<Demonstration> {
+    let DemonstrationView { view, truth, outline, .. } = demonstration_view_at(object, place)?;
+    let annotation = Annotation {
+        bbox: outline.bounds(),
+        grasp: Some(truth.line),
+        outline: Some(outline),
+        ..shipped.annotation.clone()
+    };
+    Ok(Demonstration { image: view.image, annotation })
 }
 
 /// The losses of a teaching run, averaged over groups of steps for storage.

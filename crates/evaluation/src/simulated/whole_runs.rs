@@ -175,6 +175,8 @@ fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync))
         preset: Preset::Edge,
         store: &store,
         views: 2,
+        // The second photo is marked by the program.
+        photos: 2,
         jobs: 1,
     };
     evaluation.run(is_interrupted, &Silent).unwrap();

@@ -28,13 +28,25 @@ pub fn seen_from_above(
     grasp_height_m: f64,
 ) -> Result<(Vec<Demonstration>, Lengths)> {
     let first = demonstrations.first().ok_or(GraspError::NoDemonstration)?;
-    let center = first.annotation.bbox.center();
+    let camera = &over_table.camera;
     let height_m = over_table.table_height_m + mark_height_m;
-    let off_plane = || GraspError::OffPlane { x: center.x, y: center.y, height_m };
-    let length = over_table.camera.metres_per_pixel(&center, height_m).ok_or_else(off_plane)?;
-    let on_plane = over_table.camera.at_height(&center, height_m).ok_or_else(off_plane)?;
-    let slant = slant(&over_table.camera, &on_plane);
-    let lengths = Lengths { pixels_per_m: 1.0 / length, mark_height_m, grasp_height_m, slant };
+    let off_plane = |at: Point2<f64>| GraspError::OffPlane { x: at.x, y: at.y, height_m };
+    let center = first.annotation.bbox.center();
+    let length = camera.metres_per_pixel(&center, height_m).ok_or_else(|| off_plane(center))?;
+    let slant_of = |demonstration: &Demonstration| {
+        let center = demonstration.annotation.bbox.center();
+        let on_plane = camera.at_height(&center, height_m).ok_or_else(|| off_plane(center))?;
+        Ok(slant(camera, &on_plane))
+    };
+    let mut slants = demonstrations.iter().map(slant_of).collect::<Result<Vec<_>>>()?.into_iter();
+    let lengths = Lengths {
+        pixels_per_m: 1.0 / length,
+        mark_height_m,
+        grasp_height_m,
+        slant: slants.next().ok_or(GraspError::NoDemonstration)?,
+        further_slants: slants.collect(),
+        edges: None,
+    };
     let view = plan_view(over_table, &lengths)?;
     let map = PlanViewMap::new(&over_table.camera, &view);
     let made = demonstrations

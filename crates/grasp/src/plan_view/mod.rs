@@ -96,7 +96,7 @@ impl PlanViewDetector {
     /// # Errors
     /// A model without lengths; a camera whose pictures do not show the plane, or not the region.
     pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
-        let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
+        let lengths = model.facts().lengths.clone().ok_or(GraspError::NoLengths)?;
         let view = plan_view(over_table, &lengths)?;
         let map = PlanViewMap::new(&over_table.camera, &view);
         let region =
@@ -219,13 +219,19 @@ impl PlanViewDetector {
     }
 
     /// The detection in the picture, with its pose in metres; `None` if it is outside the picture.
-    pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanViewDetection> {
+    pub(crate) fn placed(&self, mut detection: GraspDetection) -> Option<PlanViewDetection> {
+        let changed_slant = self.changed_slant(&detection)?;
+        // The outline remains at the compared edges.
+        let displaced =
+            changed_slant * (self.view.pixels_per_m * self.lengths.edges.map_or(0.0, |edges| edges.height_m));
+        (detection.grasp.x, detection.grasp.y) = (detection.grasp.x - displaced.x, detection.grasp.y - displaced.y);
+        detection.keypoints.iter_mut().for_each(|(point, _)| *point -= displaced);
         let grasp = detection.grasp;
         let center = grasp.center();
         let seen = self.view.in_picture(&self.over_table.camera, &center)?;
         let above = self.over_table.table_height_m + self.lengths.grasp_height_m;
         let on_plane = self.view.point(&center);
-        let circumstances = self.circumstances(&detection, &on_plane, &seen)?;
+        let circumstances = self.circumstances(&detection, changed_slant, &seen)?;
         let pose = PlanarPose {
             position_m: Point3::new(on_plane.x, on_plane.y, above),
             // The plan view's y is opposite to the world's.
@@ -237,24 +243,30 @@ impl PlanViewDetector {
         Some(PlanViewDetection { detection: self.in_picture(detection)?, pose })
     }
 
-    /// The conditions that determine the errors of a detection in the plan view, whose grasp is at `on_plane` in the
-    /// world and at `seen` in the picture.
+    /// The slant at a detection in the plan view minus that of the demonstration's photo, which is rotated with the
+    /// part; see [`slant`].
+    fn changed_slant(&self, detection: &GraspDetection) -> Option<Vector2<f64>> {
+        let GraspDetection { demonstration_idx, grasp, .. } = *detection;
+        let here = slant(&self.over_table.camera, &self.view.point(&grasp.center()));
+        let taught = self.model.demonstrations().get(demonstration_idx)?.marks.grasp.angle();
+        let turn = Rotation2::new(grasp.angle.radians() - taught.radians());
+        Some(Vector2::from(here) - turn * Vector2::from(self.lengths.slant_of(demonstration_idx)))
+    }
+
+    /// The conditions that determine the errors of a detection in the plan view, whose grasp is at `seen` in the
+    /// picture.
     fn circumstances(
         &self,
         detection: &GraspDetection,
-        on_plane: &Point3<f64>,
+        changed_slant: Vector2<f64>,
         seen: &Point2<f64>,
     ) -> Option<Circumstances> {
-        let camera = &self.over_table.camera;
         let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
-        // The photo's slant, rotated with the part.
-        let taught = self.model.demonstrations().first()?.marks.grasp.angle();
-        let turn = Rotation2::new(detection.grasp.angle.radians() - taught.radians());
-        let changed = Vector2::from(slant(camera, on_plane)) - turn * Vector2::from(self.lengths.slant);
         Some(Circumstances {
-            pixel_m: camera.metres_per_pixel(seen, self.view.height_m)?,
-            slant: changed.norm(),
+            pixel_m: self.over_table.camera.metres_per_pixel(seen, self.view.height_m)?,
+            slant: changed_slant.norm(),
             mark_height_m: self.lengths.mark_height_m,
+            edge_sigma_m: self.lengths.edges.map(|edges| edges.sigma_m),
             diagonal_m: (x2 - x1).hypot(y2 - y1) / self.view.pixels_per_m,
             agreement: detection.agreement.unwrap_or(0.0),
         })

@@ -7,7 +7,8 @@
 //! length = √(noise² + walls² + shades²);  position: length;  angle: length / diagonal of the part
 //! ```
 //! The noise is that of the picture's edges, in pixels of the picture. The walls are the sides of the part that are
-//! visible to a camera beside it but not in the photo. The shades are light and shadow, which cause different edges on
+//! visible to a camera beside it but not in the photo. If the height of the compared edges was measured, they displace
+//! the position only by its error: sigma · slant. The shades are light and shadow, which cause different edges on
 //! a high part in every picture.
 
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,9 @@ pub struct Circumstances {
     pub slant: f64,
     /// Height of the marks above the table, in metres.
     pub mark_height_m: f64,
+    /// Standard deviation of the measured height of the compared edges above the marks, in metres; `None` if the height
+    /// was not measured.
+    pub edge_sigma_m: Option<f64>,
     /// Diagonal of the part's box, in metres.
     pub diagonal_m: f64,
     /// Agreement with the demonstration, from 0 to 1; 0 if it was not computed.
@@ -61,17 +65,24 @@ impl ErrorLength {
 
     /// The length in metres.
     pub fn metres(&self, circumstances: &Circumstances) -> f64 {
+        self.metres_with_walls(circumstances, self.by_slant * circumstances.mark_height_m)
+    }
+
+    /// The length with this error of the edges' height, in metres.
+    fn metres_with_walls(&self, circumstances: &Circumstances, walls_m: f64) -> f64 {
         let Circumstances { pixel_m, slant, mark_height_m, agreement, .. } = *circumstances;
         let noise_m = self.pixels * pixel_m * (self.by_disagreement * (1.0 - agreement)).exp();
-        noise_m.hypot(self.by_slant * mark_height_m * slant).hypot(self.by_height * mark_height_m)
+        noise_m.hypot(walls_m * slant).hypot(self.by_height * mark_height_m)
     }
 }
 
 impl Circumstances {
     /// The expected errors.
     pub fn uncertainty(&self) -> Uncertainty {
+        let position = ErrorLength::POSITION;
+        let walls_m = (position.by_slant * self.mark_height_m).min(self.edge_sigma_m.unwrap_or(f64::INFINITY));
         Uncertainty {
-            position_m: ErrorLength::POSITION.metres(self),
+            position_m: position.metres_with_walls(self, walls_m),
             yaw_rad: ErrorLength::TURN.metres(self) / self.diagonal_m,
         }
     }
@@ -83,7 +94,14 @@ mod tests {
 
     #[test]
     fn each_cause_adds_to_the_errors() {
-        let clear = Circumstances { pixel_m: 0.001, slant: 0.0, mark_height_m: 0.0, diagonal_m: 0.1, agreement: 1.0 };
+        let clear = Circumstances {
+            pixel_m: 0.001,
+            slant: 0.0,
+            mark_height_m: 0.0,
+            edge_sigma_m: None,
+            diagonal_m: 0.1,
+            agreement: 1.0,
+        };
         let error = |circumstances: Circumstances| circumstances.uncertainty();
         assert!((error(clear).position_m - 0.279e-3).abs() < 1e-12);
         assert!((error(clear).yaw_rad - 1.33e-3).abs() < 1e-12);
@@ -94,6 +112,10 @@ mod tests {
         assert!((error(high).position_m - 0.279e-3f64.hypot(0.78e-3)).abs() < 1e-12);
         let beside = Circumstances { slant: 0.3, ..high };
         assert!(error(beside).position_m > error(high).position_m && error(beside).yaw_rad > error(high).yaw_rad);
+        // If the edges' height is known to 1 mm, they displace the position by 0.3 mm, and the angle as before.
+        let measured = error(Circumstances { edge_sigma_m: Some(0.001), ..beside });
+        assert!((measured.position_m - error(high).position_m.hypot(0.3e-3)).abs() < 1e-12);
+        assert_eq!(measured.yaw_rad, error(beside).yaw_rad);
         // A larger part has a smaller error in angle for the same error of its edges.
         let larger = error(Circumstances { diagonal_m: 0.2, ..beside });
         assert!((larger.yaw_rad - 0.5 * error(beside).yaw_rad).abs() < 1e-12);

@@ -13,6 +13,7 @@ mod absent;
 mod detector_teaching;
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
+mod edge_height;
 mod event;
 mod fine_tuning;
 mod held_back;
@@ -55,6 +56,7 @@ use crate::search_window::check_region;
 use crate::taught::TaughtDemonstration;
 
 use absent::AbsentSamples;
+use edge_height::edge_height;
 pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
@@ -101,6 +103,11 @@ pub fn teach(
     let options = options.with_start_read()?;
     let mut by_search = without_network(demonstrations, &options)?;
     let (alone, _) = without_unmarked_parts(&by_search, demonstrations)?;
+    let mut lengths = options.lengths.clone();
+    if let Some(lengths) = &mut lengths {
+        let of_known_size = by_search.clone().of_known_size()?;
+        lengths.edges = edge_height(of_known_size.demonstrations(), demonstrations, lengths)?;
+    }
     let mut taught = match NetworkTeaching::new(&options) {
         Some(teaching) => teach_network(demonstrations, &alone, &teaching, &options, observe, start)?,
         None => {
@@ -114,6 +121,7 @@ pub fn teach(
     if !options.negatives.is_empty() {
         taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
     }
+    taught.model.facts.lengths = lengths;
     taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
     taught.model = taught.model.with_region(options.region)?;
     Ok(taught)
@@ -206,7 +214,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions) -> 
             seed: options.seed,
             symmetry: options.symmetry,
             size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
-            lengths: options.lengths,
+            lengths: options.lengths.clone(),
             region: None,
             samples: 0,
             steps: 0,
@@ -332,7 +340,7 @@ pub(crate) fn teach_network(
         seed: options.seed,
         symmetry: options.symmetry,
         size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
-        lengths: options.lengths,
+        lengths: options.lengths.clone(),
         region: None,
         samples: history.steps.iter().map(|step| step.samples).sum(),
         steps: history.steps.len(),

@@ -10,6 +10,6 @@ pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, 
 pub(crate) use nominal::shows_whole;
 pub use nominal::{
     DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
-    in_picture, test_view, test_views,
+    demonstration_view_at, in_picture, test_view, test_views,
 };
 pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, other_view};

@@ -121,11 +121,18 @@ pub struct DemonstrationView {
 /// # Errors
 /// As for [`Workcell::new`]; [`SimulationError::Configuration`] if the part is not in the camera's view.
 pub fn demonstration_view(spec: &ObjectSpec) -> Result<DemonstrationView> {
-    demonstration_view_drawn(&WorkcellConfig::new(demonstration_scene(spec)))
+    demonstration_view_at(spec, DEMONSTRATION_PLACE)
 }
 
-fn demonstration_scene(spec: &ObjectSpec) -> SceneVariation {
-    let (x, y, yaw_rad) = DEMONSTRATION_PLACE;
+/// As [`demonstration_view`], with the part at another place.
+///
+/// # Errors
+/// As for [`demonstration_view`].
+pub fn demonstration_view_at(spec: &ObjectSpec, place: (f64, f64, f64)) -> Result<DemonstrationView> {
+    demonstration_view_drawn(&WorkcellConfig::new(demonstration_scene(spec, place)))
+}
+
+fn demonstration_scene(spec: &ObjectSpec, (x, y, yaw_rad): (f64, f64, f64)) -> SceneVariation {
     SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad))))
 }
 
@@ -188,7 +195,7 @@ mod tests {
     fn demonstration_marks_lie_along_the_middle_of_the_drawn_part() {
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
-            let shown = demonstration_view_drawn(&drawn_fast(demonstration_scene(&spec))).unwrap();
+            let shown = demonstration_view_drawn(&drawn_fast(demonstration_scene(&spec, DEMONSTRATION_PLACE))).unwrap();
             let line = shown.truth.line;
             let across = nalgebra::Vector2::new(-(line.end - line.start).y, (line.end - line.start).x).normalize();
             // The distance from the grasp's centre to the part's outer edge on each side is searched in steps of 0.1

@@ -141,6 +141,16 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub axis_views: u32,
+    /// Number of photos of each part for --cameras: the shipped one, and others with the part near the picture's border
+    #[arg(
+        long,
+        default_value_t = 1,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=3),
+        requires = "cameras",
+        help_heading = AXES
+    )]
+    pub photos: u32,
     /// Number of edge points that model S compares at each pose of its search, instead of the taught number
     #[arg(
         long,

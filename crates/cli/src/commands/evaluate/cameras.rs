@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use sdg_evaluation::Store;
-use sdg_evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet};
+use sdg_evaluation::cameras::{CamerasEvaluation, CamerasSummary, MAX_PHOTOS, PictureSet};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -14,6 +14,8 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
+
+const _: () = assert!(MAX_PHOTOS == 3, "the range of --photos in args.rs");
 
 /// Runs the remaining units, then writes the tables of all finished ones; also after Ctrl-C.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
@@ -33,6 +35,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         preset,
         store: &store,
         views: args.axis_views,
+        photos: args.photos,
         jobs,
     };
     let interrupt = Interrupt::watch();
@@ -78,6 +81,7 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
     words.extend((!args.models.is_empty()).then(|| format!("--models {}", args.models.join(","))));
     words.extend((!args.objects.is_empty()).then(|| format!("--objects {}", args.objects.join(","))));
     words.push(format!("--axis-views {} --preset {}", args.axis_views, args.preset));
+    words.extend((args.photos > 1).then(|| format!("--photos {}", args.photos)));
     words.extend(args.steps.map(|steps| format!("--steps {steps}")));
     words.extend(args.time_budget.map(|secs| format!("--time-budget {secs}")));
     words.push(format!("--seed {}", args.seed));

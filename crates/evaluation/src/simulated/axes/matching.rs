@@ -134,6 +134,7 @@ mod tests {
         let middle: Point2<f64> = nalgebra::center(&start, &end);
         let along = end - start;
         GraspDetection {
+            demonstration_idx: 0,
             score,
             network_score: score,
             agreement: None,

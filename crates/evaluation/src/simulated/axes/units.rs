@@ -177,7 +177,9 @@ impl std::fmt::Display for Unit<'_> {
         match self {
             Self::Teach(cell, Marks::Shipped) => write!(f, "teach {} {}", cell.model, cell.object),
             Self::Teach(cell, Marks::Jittered) => write!(f, "teach {} {} from jittered marks", cell.model, cell.object),
-            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
+            Self::Teach(cell, Marks::InPlanView { .. }) => {
+                write!(f, "teach {} {} in the plan view", cell.model, cell.object)
+            }
             Self::Pictures(object, axis) => write!(f, "{axis} {}", object.name),
             Self::Grasps(cell, _, condition) => write!(f, "grasp {} {}, {}", cell.model, cell.object, condition.name()),
         }

@@ -16,6 +16,7 @@ mod summary;
 mod tables;
 mod units;
 
+pub use super::teaching::MAX_PHOTOS;
 pub use records::{CameraPicture, CameraRecord, MetricAnswer};
 pub use sets::PictureSet;
 pub use summary::{CamerasSummary, ErrorFigures, SetFigures};

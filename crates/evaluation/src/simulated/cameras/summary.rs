@@ -51,6 +51,8 @@ pub struct SetFigures {
 /// All results.
 #[derive(Debug, Clone, Serialize)]
 pub struct CamerasSummary {
+    /// Number of photos from which each part was taught.
+    pub photos: u32,
     /// Results of each model and set, over all parts.
     pub sets: Vec<SetFigures>,
     /// Results of each model and set, for low and high parts separately.
@@ -117,7 +119,7 @@ impl CamerasSummary {
                 by_part.extend(of(model, "three cameras", &object.name, &of_part));
             }
         }
-        Ok(Self { sets, by_height, by_part, seconds, remaining: evaluation.remaining()? })
+        Ok(Self { photos: evaluation.photos, sets, by_height, by_part, seconds, remaining: evaluation.remaining()? })
     }
 }
 

@@ -11,12 +11,17 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
     vec![
         Titled {
             title: "By set of pictures".into(),
-            lead: "Taught from the wrist camera's photo in its plan view. Webcam, phone and overhead are other cameras with \
-                   their own lenses, heights and tilts to 25 degrees; the other sets are the wrist camera's, harder along an \
-                   axis; other-sizes shows parts of 0.8, 0.9, 1.1 or 1.25 times the size, which should be refused. Errors are \
-                   of the detected parts, in the marks' plane; within sigma: the share within the detection's own estimate \
-                   for 68 %."
-                .into(),
+            lead: format!(
+                "Taught from {} of the wrist camera in its plan view. Webcam, phone and overhead are other cameras with \
+                 their own lenses, heights and tilts to 25 degrees; the other sets are the wrist camera's, harder along an \
+                 axis; other-sizes shows parts of 0.8, 0.9, 1.1 or 1.25 times the size, which should be refused. Errors are \
+                 of the detected parts, in the marks' plane; within sigma: the share within the detection's own estimate \
+                 for 68 %.",
+                match summary.photos {
+                    1 => "one photo".to_owned(),
+                    photos => format!("{photos} photos"),
+                }
+            ),
             table: table(&summary.sets, None),
         },
         Titled {

@@ -40,6 +40,8 @@ pub struct CamerasEvaluation<'a> {
     pub store: &'a Store,
     /// Number of pictures of each part and set.
     pub views: u32,
+    /// Number of photos from which parts are taught, from 1 to [`MAX_PHOTOS`](super::MAX_PHOTOS).
+    pub photos: u32,
     /// Number of parallel units.
     pub jobs: usize,
 }
@@ -52,6 +54,16 @@ struct CameraSettings {
     #[serde(flatten)]
     teaching: TeachingSettings,
     views: u32,
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    photos: u32,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn is_one(photos: &u32) -> bool {
+    *photos == 1
 }
 
 impl CamerasEvaluation<'_> {
@@ -79,13 +91,22 @@ impl CamerasEvaluation<'_> {
 
     /// Whether teaching for a cell gave no model.
     pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
-        cell.is_without_model(Marks::InPlanView, self.store)
+        cell.is_without_model(self.marks(), self.store)
+    }
+
+    fn marks(&self) -> Marks {
+        Marks::InPlanView { photos: self.photos }
     }
 
     fn settings(&self) -> CameraSettings {
         /// The current version of pictures and scoring.
         const CAMERAS: u32 = 1;
-        CameraSettings { cameras: CAMERAS, teaching: self.store.settings().teaching(), views: self.views }
+        CameraSettings {
+            cameras: CAMERAS,
+            teaching: self.store.settings().teaching(),
+            views: self.views,
+            photos: self.photos,
+        }
     }
 
     fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
@@ -101,7 +122,7 @@ impl CamerasEvaluation<'_> {
                     if self.record(cell, set)?.is_some() {
                         continue;
                     }
-                    if after.is_empty() && cell.teaching_from(Marks::InPlanView, self.store)?.is_none() {
+                    if after.is_empty() && cell.teaching_from(self.marks(), self.store)?.is_none() {
                         after.push(tasks.len());
                         tasks.push(Task { unit: Unit::Teach(cell.network()), after: Vec::new() });
                     }
@@ -116,7 +137,7 @@ impl CamerasEvaluation<'_> {
         match unit {
             Unit::Teach(cell) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
-                teaching.teach(cell, Marks::InPlanView, is_interrupted)
+                teaching.teach(cell, self.marks(), is_interrupted)
             }
             Unit::Pictures(cell, object, set) => self.detect_in_pictures(cell, object, set, is_interrupted),
         }
@@ -129,7 +150,7 @@ impl CamerasEvaluation<'_> {
         set: PictureSet,
         is_interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<String>> {
-        let Some(model) = cell.read_model(Marks::InPlanView, self.store)? else {
+        let Some(model) = cell.read_model(self.marks(), self.store)? else {
             return Ok(Some(NO_MODEL.to_owned()));
         };
         let started = Instant::now();
