@@ -14,7 +14,7 @@ use sdg_camera::LatestFrame;
 use sdg_geometry::Polygon;
 use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Lengths, Verification};
 use sdg_robot::height::{GivenHeight, MeasuredHeight, Sighting};
-use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
+use sdg_robot::{Arm, CameraPose, GraspTarget, PartFinder, Place, RobotError};
 
 use crate::mounted_camera::MountedCamera;
 use crate::perception::{Found, Perception};
@@ -121,8 +121,6 @@ const SIZE_LEEWAY: f64 = 0.03;
 const HEIGHT_BY_SIZE_SIGMA_M: f64 = 0.015;
 /// In a picture for measuring a height: maximum horizontal distance of the part from its expected position, in metres.
 const SAME_PART_M: f64 = 0.040;
-/// Maximum relative difference between the demonstrations' sizes for deriving a part's height from its size.
-const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 /// Margin added to the height of the part's top, in metres.
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface is searched within this number of standard deviations of the expected height.
@@ -135,6 +133,11 @@ const SIGMAS_OF_RADIUS: f64 = 1.51;
 impl<P> ModelFinder<P> {
     /// Creates a finder of the model's part with this camera.
     pub fn new(model: GraspModel, camera: MountedCamera, pictures: P) -> Self {
+        // A camera on the hand measures the height of the edges at each grasp, and positions in their plane are right.
+        let model = match camera.pose {
+            CameraPose::OnFlange(_) => model.without_edge_height(),
+            CameraPose::InBase(_) => model,
+        };
         let perception = Perception::of_any_camera(model);
         Self {
             pictures,
@@ -197,7 +200,7 @@ impl<P> ModelFinder<P> {
         }
     }
 
-    /// The best part that does not lie in a place, if parts lie `higher_m` above the table.
+    /// Assumes that parts lie `higher_m` above the table, and returns the best one outside the places.
     fn find_best<A: Arm>(&mut self, arm: &mut A, higher_m: f64) -> sdg_robot::Result<Option<GraspTarget>>
     where
         P: Pictures<A>,
@@ -306,16 +309,11 @@ impl<P> ModelFinder<P> {
     }
 
     /// Size of a part in the plane of the marks, relative to the demonstrated size; `None` if the model knows no
-    /// lengths, if the demonstrations' sizes differ, or if the picture was not compared with a demonstration.
+    /// lengths, or if the picture was not compared with a demonstration.
     fn size_of(&self, found: &Found) -> Option<f64> {
         found.detection.agreement?;
-        let model = self.perception.model();
-        let pixels_per_m = self.lengths()?.pixels_per_m;
-        let widths_px = model.demonstrations().iter().map(|demonstration| demonstration.marks.width_px);
-        let width_px = model.demonstrations().first()?.marks.width_px;
-        let is_one_size =
-            widths_px.into_iter().all(|other_px| (other_px / width_px - 1.0).abs() <= MAX_SIZE_DIFFERENCE);
-        is_one_size.then_some(found.pose?.opening_m * pixels_per_m / width_px)
+        let taught = self.perception.model().demonstrations().get(found.detection.demonstration_idx)?;
+        Some(found.pose?.opening_m * self.lengths()?.pixels_per_m / taught.marks.width_px)
     }
 
     fn outline_of(&self, found: &Found, camera_over_table: &CameraOverTable) -> Option<SeenOutline> {

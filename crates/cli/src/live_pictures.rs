@@ -1,10 +1,13 @@
 //! `--from ADDRESS`: opens a camera with the crate for its address.
 
+use std::time::Duration;
+
 use anyhow::{Context, Result};
 use clap::Args;
 use sdg_camera::{Address, Camera, Encoding, Frame, OpenOptions};
 
 use crate::exit::Usage;
+use crate::shared_args::seconds;
 
 /// A camera and its settings.
 #[derive(Debug, Args)]
@@ -50,8 +53,14 @@ pub struct RequestArgs {
     #[arg(long, value_name = "KELVIN")]
     pub white_balance_kelvin: Option<u32>,
     /// Seconds without a frame after which a camera is stale; default: 2
-    #[arg(long, value_name = "SECS")]
+    #[arg(long, value_name = "SECS", value_parser = stall_seconds)]
     pub stall_secs: Option<f64>,
+}
+
+/// Parses a time without frames; the limits are those of cameras.
+fn stall_seconds(text: &str) -> Result<f64, String> {
+    let secs = seconds(text)?;
+    if (0.01..=3600.0).contains(&secs) { Ok(secs) } else { Err("expected 0.01 to 3600 seconds".to_owned()) }
 }
 
 /// The names of encodings on the command line.
@@ -114,9 +123,7 @@ impl RequestArgs {
             encoding: self.encoding.map(Encoding::from),
             exposure_secs: self.exposure_ms.map(|ms| ms / 1e3),
             white_balance_kelvin: self.white_balance_kelvin,
-            // A time that `Duration` cannot represent becomes zero, which is rejected when the camera is opened.
-            stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS))
-                .unwrap_or_default(),
+            stall_timeout: Duration::from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS)),
             ..OpenOptions::default()
         }
     }

@@ -133,7 +133,8 @@ fn cameras_that_are_none_are_refused() {
     assert_refused(&grab("http://127.0.0.1:1/", &[]), 1, &["http://127.0.0.1:1/", "no connection"]);
     let file = format!("file:{}", from.path().join("a.png").display());
     assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);
-    assert_refused(&grab(&file, &["--stall-secs=-1"]), 1, &["stall timeout"]);
+    assert_refused(&grab(&file, &["--stall-secs=-1"]), 2, &["positive number of seconds"]);
+    assert_refused(&grab(&file, &["--stall-secs", "1e30"]), 2, &["--stall-secs", "0.01 to 3600 seconds"]);
     assert_refused(&grab(&file, &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
     assert_refused(&grab(&file, &["--every=-1"]), 2, &["0 to 86400"]);
     assert!(!out.exists(), "a failed call writes nothing");

@@ -11,8 +11,22 @@ pub(crate) struct Node<'a> {
     pub place: String,
 }
 
+/// Maximum number of objects: twice that of the labels of COCO. Each takes about 700 bytes of memory, a
+/// hundred times its length in a file of small objects.
+const MAX_OBJECTS: usize = 2_000_000;
+
 /// Parses the bytes; errors give line and column.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
+    parse_within(bytes, MAX_OBJECTS)
+}
+
+fn parse_within(bytes: &[u8], max_objects: usize) -> Result<Value> {
+    // Braces in texts count as well: a limit needs no exact number.
+    let braces = bytes.iter().filter(|byte| **byte == b'{').count();
+    if braces > max_objects {
+        let expected = format!("at most {max_objects} objects");
+        return Err(Error::Malformed { place: "the file".into(), expected, found: braces.to_string() });
+    }
     // Windows editors often start with a byte order mark, which the parser does not accept.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let parsed = serde_json::from_slice(bytes);
@@ -151,4 +165,19 @@ fn key_list(value: &Value) -> String {
 pub(crate) fn shorten(text: &str) -> String {
     const LONGEST: usize = 40;
     if text.chars().count() <= LONGEST { text.to_string() } else { text.chars().take(LONGEST).chain(['…']).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_too_many_objects_is_refused_before_it_is_parsed() {
+        let list = |count: usize| format!("[{}{{}}]", "{},".repeat(count - 1));
+        assert_eq!(parse_within(list(9).as_bytes(), 9).unwrap().as_array().unwrap().len(), 9);
+        let error = parse_within(list(10).as_bytes(), 9).unwrap_err().to_string();
+        assert!(error.ends_with("expected at most 9 objects, found 10"), "{error}");
+        // The limit is checked before parsing: this text is not JSON.
+        assert!(parse(&b"[{},".repeat(MAX_OBJECTS + 1)).unwrap_err().to_string().contains("2000000 objects"));
+    }
 }

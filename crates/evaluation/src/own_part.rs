@@ -135,7 +135,8 @@ impl OwnPart {
         );
         object.description.clone_from(&facts);
         let model = match known {
-            Some(_) => model,
+            // The simulated part is an extrusion, whose edges lie in the plane of the marks.
+            Some(_) => model.without_edge_height(),
             None => {
                 let (mark, grasp) = (object.mark_height_m, object.grasp_height_m);
                 let lengths = Lengths::of_level_photos(1.0 / metres_per_pixel, mark, grasp);

@@ -1,5 +1,7 @@
 //! A model's lengths: part of its file.
 
+use nalgebra::{Rotation2, Vector2};
+use sdg_geometry::Angle;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{GraspError, Result};
@@ -52,6 +54,13 @@ impl Lengths {
         *further.unwrap_or(&self.slant)
     }
 
+    /// The slant of a picture minus that of a demonstration's photo, which is rotated with the part by `turn` from the
+    /// photo to the picture.
+    pub(crate) fn changed_slant(&self, slant: [f64; 2], demonstration_idx: usize, turn: Angle) -> Vector2<f64> {
+        let taught = Vector2::from(self.slant_of(demonstration_idx));
+        Vector2::from(slant) - Rotation2::new(turn.radians()) * taught
+    }
+
     /// Checks that the values are possible.
     ///
     /// # Errors
@@ -71,5 +80,33 @@ impl Lengths {
             expected: format!("1 to {MAX_PIXELS_PER_M} pixels per metre and heights of 0 to {MAX_HEIGHT_M} m"),
             found: format!("{self:?}"),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slants_and_edge_heights_must_be_possible() {
+        let lengths = Lengths::of_level_photos(1000.0, 0.02, 0.01);
+        let edges = Some(EdgeHeight { height_m: -0.003, sigma_m: 0.002 });
+        let measured = Lengths { slant: [0.1, 0.2], further_slants: vec![[0.3, 0.4]], edges, ..lengths };
+        assert_eq!((measured.check(), measured.slant_of(0), measured.slant_of(1)), (Ok(()), [0.1, 0.2], [0.3, 0.4]));
+        // A file of an earlier version has only the first photo's slant.
+        assert_eq!(measured.slant_of(2), [0.1, 0.2]);
+        let turned = measured.changed_slant([1.0, 1.0], 1, Angle::from_degrees(90.0));
+        assert!((turned - Vector2::new(1.4, 0.7)).norm() < 1e-12, "{turned}");
+        for (height_m, sigma_m) in [(2.5, 0.001), (f64::NAN, 0.001), (0.001, -0.001), (0.001, f64::INFINITY)] {
+            let edges = Some(EdgeHeight { height_m, sigma_m });
+            assert!(Lengths { edges, ..measured.clone() }.check().is_err(), "{height_m}, {sigma_m}");
+        }
+        assert!(Lengths { further_slants: vec![[f64::NAN, 0.0]], ..measured }.check().is_err());
+    }
+
+    #[test]
+    fn lengths_of_earlier_versions_are_read() {
+        let earlier = r#"{"pixels_per_m":1000.0,"mark_height_m":0.02,"grasp_height_m":0.01}"#;
+        assert_eq!(serde_json::from_str::<Lengths>(earlier).unwrap(), Lengths::of_level_photos(1000.0, 0.02, 0.01));
     }
 }

@@ -157,6 +157,15 @@ impl GraspModel {
         self.facts.region.as_ref()
     }
 
+    /// The model without the measured height of its edges: positions are not corrected.
+    #[must_use]
+    pub fn without_edge_height(mut self) -> Self {
+        if let Some(lengths) = &mut self.facts.lengths {
+            lengths.edges = None;
+        }
+        self
+    }
+
     /// The model for plan views of its demonstrations' resolution.
     pub(crate) fn of_known_size(self) -> Result<Self> {
         let mut model = self.with_check(|check| {

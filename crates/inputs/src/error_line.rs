@@ -14,9 +14,9 @@ pub fn one_line(error: &anyhow::Error) -> String {
     line
 }
 
-/// The first `most` names, and the number of the others.
-pub fn first_names(names: &[String], most: usize) -> String {
-    match names.split_at_checked(most) {
+/// The first `max_named` names, and the number of the others.
+pub fn first_names(names: &[String], max_named: usize) -> String {
+    match names.split_at_checked(max_named) {
         Some((first, others @ [_, ..])) => format!("{}, {} more", first.join(", "), others.len()),
         _ => names.join(", "),
     }

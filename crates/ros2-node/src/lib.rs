@@ -70,9 +70,11 @@ pub fn run(
         if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
             let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);
             match over_table.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
-                Ok(searched) => {
-                    topics.publish(&node, &searched);
+                Ok(mut searched) => {
+                    // A request may ask for lower scores than the node's setting.
                     services.searched(Ok(&searched), picture.arrived);
+                    searched.keep_by_setting();
+                    topics.publish(&node, &searched);
                 }
                 Err(error) => {
                     let error = one_line(&error);

@@ -25,12 +25,22 @@ pub(super) struct Searcher {
 pub(super) struct Searched {
     pub(super) header: Header,
     pub(super) arrived: Instant,
+    /// The node's minimum score.
+    pub(super) min_score: f64,
     /// The parts that were found, best first.
     pub(super) found: Vec<FoundPart>,
     /// The same detections in the form for drawing.
     pub(super) detections: Vec<GraspDetection>,
     pub(super) picture: std::sync::Arc<RgbImage>,
     pub(super) search_secs: f64,
+}
+
+impl Searched {
+    /// Removes the parts below the node's minimum score.
+    pub(super) fn keep_by_setting(&mut self) {
+        self.found.retain(|part| part.score >= self.min_score);
+        self.detections.retain(|detection| detection.score >= self.min_score);
+    }
 }
 
 impl Searcher {
@@ -77,14 +87,13 @@ impl Searcher {
             }),
         };
         let seen = perception.detect(&picture.picture, Verification::ByShape)?;
-        let found: Vec<_> = seen.iter().map(part).collect();
-        let detections = seen.into_iter().map(|found| found.detection);
-        let is_kept = |score: f64| score >= self.min_score;
+        let found = seen.iter().map(part).collect();
         Ok(Searched {
             header: picture.header.clone(),
             arrived: picture.arrived,
-            found: found.into_iter().filter(|part| is_kept(part.score)).collect(),
-            detections: detections.filter(|detection| is_kept(detection.score)).collect(),
+            min_score: self.min_score,
+            found,
+            detections: seen.into_iter().map(|found| found.detection).collect(),
             picture: std::sync::Arc::clone(&picture.picture),
             search_secs: started.elapsed().as_secs_f64(),
         })

@@ -271,7 +271,8 @@ impl Services {
 }
 
 fn detect_response(request: &DetectRequest, searched: &Searched) -> DetectResponse {
-    let found: Vec<_> = searched.found.iter().filter(|part| part.score >= request.min_score).cloned().collect();
+    let min_score = if request.min_score > 0.0 { request.min_score } else { searched.min_score };
+    let found: Vec<_> = searched.found.iter().filter(|part| part.score >= min_score).cloned().collect();
     let grasps: Vec<_> = found.iter().filter_map(|part| part.grasp).collect();
     DetectResponse {
         success: true,
@@ -282,5 +283,40 @@ fn detect_response(request: &DetectRequest, searched: &Searched) -> DetectRespon
         detections: to_detections(&searched.header, &found),
         poses: grasps.iter().map(|(pose, _)| to_pose(&searched.header, pose)).collect(),
         openings_m: grasps.iter().map(|(_, opening_m)| *opening_m).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+    use sdg_ros2::found::FoundPart;
+    use sdg_ros2::messages::Header;
+    use std::time::Instant;
+
+    #[test]
+    fn a_request_may_ask_for_lower_or_higher_scores_than_the_setting() {
+        let part = |score: f64| FoundPart {
+            name: "part".to_owned(),
+            score,
+            corners: [Point2::new(0.0, 0.0), Point2::new(9.0, 9.0)],
+            grasp: None,
+        };
+        let mut searched = Searched {
+            header: Header::default(),
+            arrived: Instant::now(),
+            min_score: 0.5,
+            found: [0.9, 0.6, 0.3].map(part).to_vec(),
+            detections: Vec::new(),
+            picture: Arc::default(),
+            search_secs: 0.1,
+        };
+        let counts = [0.0, 0.2, 0.4, 0.7].map(|min_score| {
+            let request = DetectRequest { min_score, ..DetectRequest::default() };
+            detect_response(&request, &searched).detections.detections.len()
+        });
+        assert_eq!(counts, [2, 3, 2, 1]);
+        searched.keep_by_setting();
+        assert_eq!(searched.found.len(), 2);
     }
 }

@@ -34,7 +34,10 @@ pub fn seen_from_above(
     let center = first.annotation.bbox.center();
     let length = camera.metres_per_pixel(&center, height_m).ok_or_else(|| off_plane(center))?;
     let slant_of = |demonstration: &Demonstration| {
-        let center = demonstration.annotation.bbox.center();
+        let Annotation { bbox, grasp, .. } = &demonstration.annotation;
+        // Edge heights displace the grasp by the slant there. With one photo, the slant is used for stated errors only.
+        let several = grasp.as_ref().filter(|_| demonstrations.len() > 1);
+        let center = several.map_or(bbox.center(), GraspLine::center);
         let on_plane = camera.at_height(&center, height_m).ok_or_else(|| off_plane(center))?;
         Ok(slant(camera, &on_plane))
     };

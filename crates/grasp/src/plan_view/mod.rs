@@ -16,7 +16,7 @@ use std::ops::RangeInclusive;
 
 use burn::tensor::read_sync;
 use image::RgbImage;
-use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 use sdg_shape::{PixelRect, PlanViewMap};
 
@@ -221,11 +221,12 @@ impl PlanViewDetector {
     /// The detection in the picture, with its pose in metres; `None` if it is outside the picture.
     pub(crate) fn placed(&self, mut detection: GraspDetection) -> Option<PlanViewDetection> {
         let changed_slant = self.changed_slant(&detection)?;
-        // The outline remains at the compared edges.
-        let displaced =
-            changed_slant * (self.view.pixels_per_m * self.lengths.edges.map_or(0.0, |edges| edges.height_m));
-        (detection.grasp.x, detection.grasp.y) = (detection.grasp.x - displaced.x, detection.grasp.y - displaced.y);
-        detection.keypoints.iter_mut().for_each(|(point, _)| *point -= displaced);
+        // Only poses by edges are displaced; the outline remains at the edges.
+        if let (Some(edges), Some(_)) = (self.lengths.edges, detection.agreement) {
+            let displaced = changed_slant * (edges.height_m * self.view.pixels_per_m);
+            (detection.grasp.x, detection.grasp.y) = (detection.grasp.x - displaced.x, detection.grasp.y - displaced.y);
+            detection.keypoints.iter_mut().for_each(|(point, _)| *point -= displaced);
+        }
         let grasp = detection.grasp;
         let center = grasp.center();
         let seen = self.view.in_picture(&self.over_table.camera, &center)?;
@@ -246,11 +247,10 @@ impl PlanViewDetector {
     /// The slant at a detection in the plan view minus that of the demonstration's photo, which is rotated with the
     /// part; see [`slant`].
     fn changed_slant(&self, detection: &GraspDetection) -> Option<Vector2<f64>> {
-        let GraspDetection { demonstration_idx, grasp, .. } = *detection;
+        let GraspDetection { demonstration_idx, grasp, .. } = detection;
         let here = slant(&self.over_table.camera, &self.view.point(&grasp.center()));
-        let taught = self.model.demonstrations().get(demonstration_idx)?.marks.grasp.angle();
-        let turn = Rotation2::new(grasp.angle.radians() - taught.radians());
-        Some(Vector2::from(here) - turn * Vector2::from(self.lengths.slant_of(demonstration_idx)))
+        let taught = self.model.demonstrations().get(*demonstration_idx)?.marks.grasp.angle();
+        Some(self.lengths.changed_slant(here, *demonstration_idx, grasp.angle - taught))
     }
 
     /// The conditions that determine the errors of a detection in the plan view, whose grasp is at `seen` in the

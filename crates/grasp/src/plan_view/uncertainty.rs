@@ -7,8 +7,8 @@
 //! length = √(noise² + walls² + shades²);  position: length;  angle: length / diagonal of the part
 //! ```
 //! The noise is that of the picture's edges, in pixels of the picture. The walls are the sides of the part that are
-//! visible to a camera beside it but not in the photo. If the height of the compared edges was measured, they displace
-//! the position only by its error: sigma · slant. The shades are light and shadow, which cause different edges on
+//! visible to a camera beside it but not in the photo. If the height of the compared edges was measured, the walls of the
+//! position are its standard deviation · slant. The shades are light and shadow, which cause different edges on
 //! a high part in every picture.
 
 use serde::{Deserialize, Serialize};
@@ -80,7 +80,7 @@ impl Circumstances {
     /// The expected errors.
     pub fn uncertainty(&self) -> Uncertainty {
         let position = ErrorLength::POSITION;
-        let walls_m = (position.by_slant * self.mark_height_m).min(self.edge_sigma_m.unwrap_or(f64::INFINITY));
+        let walls_m = self.edge_sigma_m.unwrap_or(position.by_slant * self.mark_height_m);
         Uncertainty {
             position_m: position.metres_with_walls(self, walls_m),
             yaw_rad: ErrorLength::TURN.metres(self) / self.diagonal_m,

@@ -104,9 +104,9 @@ pub fn teach(
     let mut by_search = without_network(demonstrations, &options)?;
     let (alone, _) = without_unmarked_parts(&by_search, demonstrations)?;
     let mut lengths = options.lengths.clone();
-    if let Some(lengths) = &mut lengths {
+    if let Some(lengths) = lengths.as_mut().filter(|_| demonstrations.len() > 1) {
         let of_known_size = by_search.clone().of_known_size()?;
-        lengths.edges = edge_height(of_known_size.demonstrations(), demonstrations, lengths)?;
+        lengths.edges = edge_height(of_known_size.demonstrations(), demonstrations, options.symmetry, lengths)?;
     }
     let mut taught = match NetworkTeaching::new(&options) {
         Some(teaching) => teach_network(demonstrations, &alone, &teaching, &options, observe, start)?,
