@@ -165,13 +165,11 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_measured_with_one_photo_or_from_one_side_or_far_from_the_marks() {
+    fn nothing_is_measured_with_one_photo_or_from_one_side() {
         let photo = demonstration();
-        assert_eq!(measured(&[photo.clone()], &[]), None);
+        assert_eq!(measured(std::slice::from_ref(&photo), &[]), None);
         // Rotated by half a turn, this slant is that of the first photo.
         let same_side = SLANTS[0].map(|tangent| -tangent);
         assert_eq!(measured(&[photo.clone(), rotated(&photo, [1, 0])], &[same_side]), None);
-        // 25 mm are more than three standard deviations: √(1.4² + 7.6²) mm.
-        assert_eq!(measured(&[photo.clone(), rotated(&photo, [-22, 13])], &SLANTS[1..]), None);
     }
 }
