@@ -18,8 +18,7 @@ pub fn too_wide(model: &GraspModel) -> Option<String> {
     })
 }
 
-/// Minimum height of the marks for the advice to take a second photo, in metres: below it, the height of the edges
-/// displaces a part by at most 1 to 2 mm. Chosen by hand.
+/// Minimum height of the marks for the advice to take a second photo, in metres. Chosen by hand.
 const HIGH_M: f64 = 0.010;
 
 /// The measured height of the compared edges, or for a high part the advice to measure it.
