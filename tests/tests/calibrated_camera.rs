@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
-use sdg_demonstration::{Annotation, Demonstration};
 use sdg_evaluation::shipped;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 use sdg_grasp::{
@@ -13,8 +12,7 @@ use sdg_grasp::{
 };
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
 use sdg_simulation::views::{
-    Axis, AxisView, DemonstrationView, OTHER_CAMERAS, OnTable, OtherView, axis_view, demonstration_view,
-    demonstration_view_at, other_view,
+    Axis, AxisView, OTHER_CAMERAS, OnTable, OtherView, axis_view, demonstration_view, other_view,
 };
 
 /// Seed of the pictures, which no other test or evaluation uses.
@@ -33,17 +31,12 @@ fn over_table(camera: PosedCamera) -> CameraOverTable {
 
 /// The model of a shipped photo and of photos by the same camera of the part at other places (x, y in metres and yaw in
 /// radians).
-fn taught(part: &ObjectSpec, further: &[(f64, f64, f64)]) -> GraspModel {
+pub(crate) fn taught(part: &ObjectSpec, further: &[(f64, f64, f64)]) -> GraspModel {
     let shown = demonstration_view(part).unwrap();
     let marks = part.marks_in_base(&shown.truth.base_from_object);
     let camera = over_table(shown.view.camera);
     let mut photos = vec![shipped::demonstration(&part.name).unwrap()];
-    for place in further {
-        let DemonstrationView { view, truth, outline, .. } = demonstration_view_at(part, *place).unwrap();
-        let (bbox, grasp) = (outline.bounds(), Some(truth.line));
-        let annotation = Annotation { bbox, grasp, outline: Some(outline), ..photos[0].annotation.clone() };
-        photos.push(Demonstration { image: view.image, annotation });
-    }
+    photos.extend(further.iter().map(|place| shipped::demonstration_at(part, *place).unwrap()));
     let (seen, lengths) = seen_from_above(&photos, &camera, marks[0].z, shown.truth.tcp.z).unwrap();
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;

@@ -5,4 +5,5 @@ mod calibrated_camera;
 mod every_part_without_network;
 mod network_learns;
 mod one_photo_to_grasp;
+mod plan_of_a_raised_part;
 mod tracking;

@@ -1,7 +1,9 @@
 //! The demonstrations in datasets/, compiled into the program, so that `sdg demo` runs in any folder.
 
 use anyhow::{Context, Result, bail};
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Annotation, Demonstration};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::views::{DemonstrationView, demonstration_view_at};
 
 macro_rules! shipped {
     ($($name:literal),*) => {
@@ -39,10 +41,23 @@ pub fn demonstration(object: &str) -> Result<Demonstration> {
         .with_context(|| format!("the shipped demonstration of {name}"))
 }
 
+/// A simulated photo by the camera of the shipped demonstrations, with the part at another place (x, y in metres and
+/// yaw in radians, in the base frame). The marks are exact, and the annotation is otherwise that of the shipped photo.
+pub fn demonstration_at(object: &ObjectSpec, place: (f64, f64, f64)) -> Result<Demonstration> {
+    let shipped = demonstration(&object.name)?;
+    let DemonstrationView { view, truth, outline, .. } = demonstration_view_at(object, place)?;
+    let annotation = Annotation {
+        bbox: outline.bounds(),
+        grasp: Some(truth.line),
+        outline: Some(outline),
+        ..shipped.annotation
+    };
+    Ok(Demonstration { image: view.image, annotation })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sdg_simulation::objects::ObjectSpec;
 
     #[test]
     fn every_object_has_a_demonstration_with_all_marks() {

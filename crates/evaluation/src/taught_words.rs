@@ -1,7 +1,7 @@
 //! Texts about a teaching run.
 
 use sdg_demonstration::Demonstration;
-use sdg_grasp::{EdgeHeight, Ending, GraspModel, Taught};
+use sdg_grasp::{EdgeHeight, Ending, GraspModel, Lengths, Taught};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 
 /// A warning if the jaws of a demonstration are wider than the hand opens: the detected part could not be grasped.
@@ -23,8 +23,10 @@ const HIGH_M: f64 = 0.010;
 
 /// The measured height of the compared edges, or for a high part the advice to measure it.
 pub fn edges(model: &GraspModel) -> Option<String> {
-    let lengths = model.facts().lengths.as_ref()?;
-    let photos = model.demonstrations().len();
+    edges_of(model.facts().lengths.as_ref()?, model.demonstrations().len())
+}
+
+fn edges_of(lengths: &Lengths, photos: usize) -> Option<String> {
     match lengths.edges {
         Some(EdgeHeight { height_m, sigma_m }) => Some(format!(
             "edges of the part: {:.1} mm above the marks (standard deviation {:.1} mm), measured with {photos} photos",
@@ -75,4 +77,23 @@ pub fn training(taught: &Taught) -> String {
         format!("; angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
     });
     format!(" ({} steps{ending}{orientation})", facts.steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_height_of_edges_or_for_a_high_part_the_advice_to_measure_it_is_told() {
+        let low = Lengths::of_level_photos(1000.0, 0.009, 0.005);
+        let high = Lengths { mark_height_m: 0.010, ..low.clone() };
+        assert_eq!([1, 2].map(|photos| edges_of(&low, photos)), [None, None]);
+        assert!(edges_of(&high, 1).unwrap().contains("a second photo"));
+        assert!(edges_of(&high, 2).unwrap().contains("from nearly the same side"));
+        let edges = Some(EdgeHeight { height_m: -0.0034, sigma_m: 0.0021 });
+        assert_eq!(
+            edges_of(&Lengths { edges, ..low }, 3).unwrap(),
+            "edges of the part: -3.4 mm above the marks (standard deviation 2.1 mm), measured with 3 photos"
+        );
+    }
 }

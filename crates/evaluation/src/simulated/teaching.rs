@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_demonstration::{Annotation, Demonstration};
+use sdg_demonstration::Demonstration;
 use sdg_grasp::{CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above};
 use sdg_inputs::one_line;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::views::{DemonstrationView, demonstration_view, demonstration_view_at};
+use sdg_simulation::views::demonstration_view;
 
 use super::cell::{Cell, Marks};
 use super::jitter::{MARKS_JITTER_PX, with_jittered_marks};
@@ -107,21 +107,9 @@ fn in_plan_view(object: &ObjectSpec, shipped: Demonstration, photos: u32) -> Res
     let over_table = CameraOverTable { camera, table_height_m: 0.0, workspace: None };
     let mut demonstrations = vec![shipped];
     for place in FURTHER_PLACES.into_iter().take(photos as usize - 1) {
-        demonstrations.push(further_photo(object, &demonstrations[0], place)?);
+        demonstrations.push(shipped::demonstration_at(object, place)?);
     }
     Ok(seen_from_above(&demonstrations, &over_table, object.mark_height_m, object.grasp_height_m)?)
-}
-
-/// A photo of the part at another place (x, y in metres and yaw in radians), marked as the shipped one.
-fn further_photo(object: &ObjectSpec, shipped: &Demonstration, place: (f64, f64, f64)) -> Result<Demonstration> {
-    let DemonstrationView { view, truth, outline, .. } = demonstration_view_at(object, place)?;
-    let annotation = Annotation {
-        bbox: outline.bounds(),
-        grasp: Some(truth.line),
-        outline: Some(outline),
-        ..shipped.annotation.clone()
-    };
-    Ok(Demonstration { image: view.image, annotation })
 }
 
 /// The losses of a teaching run, averaged over groups of steps for storage.

@@ -161,13 +161,15 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("is_interrupted called: no work left")), whole);
 }
 
-/// Continues with some sets of the cameras' pictures, and sums the results.
-fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> CamerasSummary {
+/// Continues with these sets of the cameras' pictures, and sums the results.
+fn go_on_with_cameras(
+    folder: &Path,
+    names: &[&str],
+    photos: u32,
+    is_interrupted: &(dyn Fn() -> bool + Sync),
+) -> CamerasSummary {
     let store = Store::open(folder, &settings()).unwrap();
-    let sets: Vec<PictureSet> = PictureSet::all()
-        .into_iter()
-        .filter(|set| ["webcam", "instances", "other-sizes"].contains(&set.name()))
-        .collect();
+    let sets: Vec<PictureSet> = PictureSet::all().into_iter().filter(|set| names.contains(&set.name())).collect();
     let evaluation = CamerasEvaluation {
         models: &[ModelKind::S],
         objects: &[ObjectSpec::by_name("pendulum").unwrap()],
@@ -175,8 +177,7 @@ fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync))
         preset: Preset::Edge,
         store: &store,
         views: 2,
-        // The second photo is marked by the program.
-        photos: 2,
+        photos,
         jobs: 1,
     };
     evaluation.run(is_interrupted, &Silent).unwrap();
@@ -187,10 +188,14 @@ fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync))
 fn interrupted_cameras_go_on_and_are_exact() {
     let folder = tempfile::tempdir().unwrap();
     let first = folder.path().join("cameras/S-pendulum.webcam.json");
-    let interrupted = go_on_with_cameras(folder.path(), &|| first.exists());
+    // The second photo is marked by the program.
+    let go_on = |is_interrupted: &(dyn Fn() -> bool + Sync)| {
+        go_on_with_cameras(folder.path(), &["webcam", "instances", "other-sizes"], 2, is_interrupted)
+    };
+    let interrupted = go_on(&|| first.exists());
     assert!(interrupted.remaining > 0, "{interrupted:?}");
     assert!(cameras::markdown(&interrupted, &[], "sdg evaluate --cameras").contains("Not complete"));
-    let whole = go_on_with_cameras(folder.path(), &|| false);
+    let whole = go_on(&|| false);
     assert_eq!((whole.remaining, whole.sets.len()), (0, 3));
     let of = |set: &str| whole.sets.iter().find(|figures| figures.set == set).unwrap();
     assert_eq!((of("webcam").found, of("instances").found), (Share { count: 2, of: 2 }, Share { count: 6, of: 6 }));
@@ -198,6 +203,16 @@ fn interrupted_cameras_go_on_and_are_exact() {
     assert_eq!((of("other-sizes").accepted, of("other-sizes").found.of), (Share { count: 0, of: 2 }, 0));
     assert!(cameras::page(&whole, &[], "sdg evaluate --cameras").to_html().is_ok());
     // Finished units are not done again.
-    let again = go_on_with_cameras(folder.path(), &|| panic!("is_interrupted called: no work left"));
+    let again = go_on(&|| panic!("is_interrupted called: no work left"));
     assert_eq!(again.sets, whole.sets);
+}
+
+#[test]
+fn cameras_are_evaluated_with_the_shipped_photo_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = go_on_with_cameras(folder.path(), &["webcam"], 1, &|| false);
+    let [webcam] = &whole.sets[..] else { panic!("{:?}", whole.sets) };
+    assert_eq!((whole.remaining, webcam.found), (0, Share { count: 2, of: 2 }));
+    assert!(webcam.errors.unwrap().p95_mm < 3.0, "{webcam:?}");
+    assert!(folder.path().join("models/S-pendulum-plan-view.sdg").exists());
 }

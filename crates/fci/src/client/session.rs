@@ -47,6 +47,8 @@ pub(crate) struct Session {
     pub(crate) sending: Sending,
     incoming: Receiver<Incoming>,
     kept: Vec<(Header, Vec<u8>)>,
+    /// The invalid message that ended the connection.
+    invalid: Option<WireError>,
     reader: Option<JoinHandle<()>>,
     udp: UdpSocket,
     udp_peer: Option<SocketAddr>,
@@ -78,6 +80,7 @@ impl Session {
             sending: Sending { address, stream: Arc::new(Mutex::new(stream)), next_id: Arc::new(AtomicU32::new(0)) },
             incoming,
             kept: Vec::new(),
+            invalid: None,
             reader: Some(reader),
             udp,
             udp_peer: None,
@@ -104,8 +107,8 @@ impl Session {
             };
             match received {
                 Ok(Ok(response)) => self.keep(response),
-                Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
-                Err(RecvTimeoutError::Disconnected) => return Err(FciError::Closed { address: self.address }),
+                Ok(Err(source)) => return Err(self.ended_by(source)),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.end()),
                 Err(RecvTimeoutError::Timeout) => {
                     let waited = timeout.unwrap_or_default();
                     return Err(FciError::Timeout { what, address: self.address, waited });
@@ -119,10 +122,13 @@ impl Session {
         self.timeout
     }
 
-    /// The response to a command, if it has arrived.
+    /// The response to a command, if it has arrived, even if the connection ended after it.
     pub(crate) fn poll(&mut self, id: u32) -> Result<Option<Vec<u8>>> {
-        self.fetch()?;
-        Ok(self.take_kept(id))
+        let fetched = self.fetch();
+        match self.take_kept(id) {
+            Some(payload) => Ok(Some(payload)),
+            None => fetched.map(|()| None),
+        }
     }
 
     /// Drops responses for which no call waits.
@@ -138,10 +144,23 @@ impl Session {
         loop {
             match self.incoming.try_recv() {
                 Ok(Ok(response)) => self.keep(response),
-                Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
+                Ok(Err(source)) => return Err(self.ended_by(source)),
                 Err(TryRecvError::Empty) => return Ok(()),
-                Err(TryRecvError::Disconnected) => return Err(FciError::Closed { address: self.address }),
+                Err(TryRecvError::Disconnected) => return Err(self.end()),
             }
+        }
+    }
+
+    fn ended_by(&mut self, invalid: WireError) -> FciError {
+        self.invalid = Some(invalid);
+        self.end()
+    }
+
+    /// The error of the ended connection.
+    fn end(&self) -> FciError {
+        match self.invalid.clone() {
+            Some(source) => FciError::Wire { address: self.address, source },
+            None => FciError::Closed { address: self.address },
         }
     }
 
@@ -270,3 +289,6 @@ pub(crate) fn is_timeout(error: &std::io::Error) -> bool {
 pub(crate) fn socket_error(action: &'static str, address: SocketAddr, source: std::io::Error) -> FciError {
     FciError::Socket { action, address: address.to_string(), source }
 }
+
+#[cfg(test)]
+mod schedules;

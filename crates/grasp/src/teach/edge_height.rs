@@ -131,7 +131,15 @@ mod tests {
     }
 
     fn measured(photos: &[Demonstration], further_slants: &[[f64; 2]]) -> Option<EdgeHeight> {
-        let level = Lengths::of_level_photos(PIXELS_PER_M, MARK_HEIGHT_M, 0.005);
+        measured_of(MARK_HEIGHT_M, photos, further_slants)
+    }
+
+    fn measured_of(
+        mark_height_m: f64,
+        photos: &[Demonstration],
+        further_slants: &[[f64; 2]],
+    ) -> Option<EdgeHeight> {
+        let level = Lengths::of_level_photos(PIXELS_PER_M, mark_height_m, 0.005);
         let lengths = Lengths { slant: SLANTS[0], further_slants: further_slants.to_vec(), ..level };
         let taught: Vec<_> = photos.iter().map(|photo| TaughtDemonstration::new(photo).unwrap()).collect();
         edge_height(&taught, photos, RotationalSymmetry::None, &lengths).unwrap()
@@ -153,6 +161,16 @@ mod tests {
         // A displacement across the change of the slant is an error of the marks.
         let across = measured(&[photo.clone(), rotated(&photo, [3, 5])], &SLANTS[1..]).unwrap();
         assert!(across.height_m.abs() < 1e-3, "{across:?}");
+    }
+
+    #[test]
+    fn displacements_that_no_usual_height_explains_are_left_out() {
+        let photo = demonstration();
+        // Marks 5 mm high: with this change of the slant, three standard deviations of heights and marks are 5.7 pixels.
+        let of = |height_m, moved| measured_of(height_m, &[photo.clone(), rotated(&photo, moved)], &SLANTS[1..]);
+        assert!(of(0.005, [2, -1]).is_some());
+        assert_eq!(of(0.005, [7, -4]), None);
+        assert!(of(MARK_HEIGHT_M, [7, -4]).is_some());
     }
 
     #[test]

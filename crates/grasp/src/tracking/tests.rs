@@ -31,16 +31,27 @@ fn tracker() -> Tracker {
 
 /// Feeds pictures of parts at `poses` in each frame; returns the tracks of each frame.
 fn run(tracker: &mut Tracker, count: u64, poses: impl Fn(u64) -> Vec<PlanarSimilarity>) -> Vec<Vec<TrackedPart>> {
+    let pictures = (0..count).map(|number| Arc::new(picture(&poses(number))));
+    run_with_searches(tracker, pictures, std::iter::repeat(SEARCH_FRAMES))
+}
+
+/// As [`run`]; each search ends this number of frames after its frame.
+fn run_with_searches(
+    tracker: &mut Tracker,
+    pictures: impl Iterator<Item = Arc<RgbImage>>,
+    mut search_frames: impl Iterator<Item = u64>,
+) -> Vec<Vec<TrackedPart>> {
     let mut pending: Option<(SearchOutcome, u64)> = None;
-    (0..count)
-        .map(|number| {
+    pictures
+        .zip(0u64..)
+        .map(|(picture, number)| {
             if let Some((outcome, _)) = pending.take_if(|(_, due)| *due == number) {
                 tracker.take_outcome(outcome).unwrap();
             }
-            let parts = tracker.frame(Arc::new(picture(&poses(number))), PERIOD * number as u32);
+            let parts = tracker.frame(picture, PERIOD * number as u32);
             if let Some(search) = tracker.search_due() {
                 assert!(tracker.search_due().is_none(), "one search at a time");
-                pending = Some((search.run(), number + SEARCH_FRAMES));
+                pending = Some((search.run(), number + search_frames.next().unwrap()));
             }
             parts
         })
@@ -86,6 +97,42 @@ fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
     assert_eq!((parts.len(), parts[0].id, parts[0].unseen_for), (1, 0, Duration::ZERO));
     for (number, parts) in all.iter().enumerate().skip(number) {
         assert_at(&parts[0], &pose(number as u64)[0], &format!("frame {number}"));
+    }
+}
+
+/// The search thread and the caller share only the results of searches, so that their orders differ only in the number
+/// of frames that each search takes.
+#[test]
+fn however_long_searches_take_a_part_is_reported_only_where_it_is() {
+    const SEARCH_FRAMES: [u64; 3] = [1, 4, 9];
+    const FRAMES: u64 = 44;
+    let pose = |number: u64| {
+        let k = number as f64;
+        match number {
+            0..15 => Some(at(80.0 + 1.5 * k, 90.0, 0.4 * k)),
+            15..21 => None,
+            _ => Some(at(230.0, 60.0 + 1.5 * (k - 21.0), 200.0)),
+        }
+    };
+    let pictures: Vec<_> = (0..FRAMES).map(|number| Arc::new(picture(pose(number).as_slice()))).collect();
+    for schedule in 0..27usize {
+        let taken = [1, 3, 9].map(|place| SEARCH_FRAMES[schedule / place % 3]);
+        let mut tracker = tracker();
+        // One search follows another, so that some end after their part has disappeared.
+        tracker.config.search_every = PERIOD;
+        let all = run_with_searches(&mut tracker, pictures.iter().cloned(), taken.into_iter().cycle());
+        for (number, parts) in all.iter().enumerate() {
+            let about = format!("searches of {taken:?} frames, frame {number}");
+            assert!(parts.len() <= 1 && parts.iter().all(|part| part.id == 0), "{about}: {parts:?}");
+            if let Some(part) = parts.iter().find(|part| part.is_followed()) {
+                let pose = pose(number as u64).unwrap_or_else(|| panic!("{about}: {part:?}"));
+                assert_at(part, &pose, &about);
+            }
+        }
+        let is_followed = |number: u64| all[number as usize].iter().any(TrackedPart::is_followed);
+        assert!((taken[0]..15).all(is_followed), "{taken:?}");
+        // A search of a frame without the part may have to end first.
+        assert!((21 + 2 * 9..FRAMES).all(is_followed), "{taken:?}");
     }
 }
 

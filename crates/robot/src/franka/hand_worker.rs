@@ -92,3 +92,6 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
         }
     }
 }
+
+#[cfg(test)]
+mod schedules;

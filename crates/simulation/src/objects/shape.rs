@@ -8,6 +8,9 @@ use super::mjcf_tags::tags;
 use super::obj_mesh::ObjMesh;
 use crate::error::{Result, SimulationError};
 
+/// The attributes that move or rotate a geom.
+const POSES: [&str; 7] = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "fromto"];
+
 /// A visible mesh of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VisualMesh {
@@ -30,7 +33,7 @@ impl ObjectSpec {
             let Some(name) = geom.get("mesh") else { continue };
             let asset = tags.iter().find(|tag| tag.name == "mesh" && tag.get("name") == Some(name));
             let file = asset
-                .filter(|asset| asset.get("scale").is_none() && geom.get("pos").is_none() && geom.get("quat").is_none())
+                .filter(|asset| asset.get("scale").is_none() && POSES.iter().all(|pose| geom.get(pose).is_none()))
                 .and_then(|asset| asset.get("file"))
                 .ok_or_else(|| {
                     fail(format!("mesh {name:?}: expected a file, placed as it is, without scale or pose"))
@@ -63,4 +66,20 @@ pub(super) fn triangles(meshes: &[VisualMesh]) -> Vec<([Point3<f64>; 3], u32)> {
         .enumerate()
         .flat_map(|(idx, VisualMesh { mesh, .. })| mesh.faces.iter().map(move |face| (mesh.corners(face), idx as u32)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_with_a_pose_is_refused() {
+        let spec = ObjectSpec::by_name("pendulum").unwrap();
+        assert!(!spec.visual_meshes().unwrap().is_empty());
+        for pose in POSES {
+            let mjcf = spec.mjcf.replace(" mesh=\"", &format!(" {pose}=\"0 0 0\" mesh=\""));
+            let error = ObjectSpec { mjcf, ..spec.clone() }.visual_meshes().unwrap_err().to_string();
+            assert!(error.contains("without scale or pose"), "{pose}: {error}");
+        }
+    }
 }
