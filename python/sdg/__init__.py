@@ -167,7 +167,12 @@ class GraspModel:
         """
         min_score = _number("min_score", min_score, 0, 1)
         found = self._native.detect(
-            _checked(array), _channels(channels), _native_of(camera), _checked_region(region), _checked_threads(threads)
+            _checked(array),
+            _channels(channels),
+            _native_of(camera),
+            _checked_region(region),
+            _checked_threads(threads),
+            min_score,
         )
         return Detections([Detection.of(record) for record in json.loads(found)], min_score)
 
@@ -265,6 +270,8 @@ def teach(
     """
     if (camera is None) != (mark_height_mm is None):
         raise ArgumentError("expected camera and mark_height_mm together, found one without the other")
+    if grasp_height_mm is not None and camera is None:
+        raise ArgumentError("expected camera with grasp_height_mm, found the height alone")
     if time_budget_s is not None and not 0 < _number("time_budget_s", time_budget_s) < 1e9:
         raise ArgumentError(f"expected time_budget_s of more than 0 seconds, found {time_budget_s}")
     of_camera = None

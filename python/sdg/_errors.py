@@ -42,7 +42,7 @@ class ClosedError(SdgError, RuntimeError):
 
 
 class ForkedError(SdgError, RuntimeError):
-    """A process that was forked from one that had detected or taught."""
+    """A process that was forked from one that had loaded a model, detected or taught."""
 
 
 class VersionError(SdgError, ImportError):

@@ -37,7 +37,13 @@ class Model:
     @property
     def object(self) -> str: ...
     def detect(
-        self, array: _Array, channels: str, camera: Optional[Camera], region: _Region, threads: Optional[int]
+        self,
+        array: _Array,
+        channels: str,
+        camera: Optional[Camera],
+        region: _Region,
+        threads: Optional[int],
+        min_score: float,
     ) -> str: ...
 
 @final

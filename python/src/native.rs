@@ -101,7 +101,8 @@ impl Model {
         self.0.grasp_model().object().to_owned()
     }
 
-    #[pyo3(signature = (array, channels, camera, region, threads))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(signature = (array, channels, camera, region, threads, min_score))]
     fn detect(
         &self,
         py: Python<'_>,
@@ -110,10 +111,11 @@ impl Model {
         camera: Option<&Camera>,
         region: Option<Region>,
         threads: Option<usize>,
+        min_score: f64,
     ) -> PyResult<String> {
         let picture = picture(array, channels)?;
         let view = view(camera, region, threads);
-        detached(py, || Ok(self.0.detect(&picture, &view)?.to_json()))
+        detached(py, || Ok(self.0.detect(&picture, &view, min_score)?.to_json()))
     }
 }
 

@@ -168,6 +168,7 @@ def test_arguments_of_detect(arguments: dict[str, Any], words: str, shape_model:
         {"time_budget_s": float("nan")},
         {"size_tolerance": (1.4, 0.8)},
         {"mark_height_mm": 10.0},
+        {"grasp_height_mm": 10.0},
         {"camera": made_pictures.CAMERA, "mark_height_mm": 0.01},
         {"camera": made_pictures.CAMERA, "mark_height_mm": "16"},
         {"camera": 7, "mark_height_mm": 16},
@@ -245,7 +246,6 @@ FORKED = """
 import os, sys
 import sdg
 model, picture = sdg.GraspModel.load(sys.argv[1]), sdg.read_picture(sys.argv[2])
-model.detect(picture)
 for threads in (None, 1):
     if os.fork() == 0:
         try:

@@ -115,6 +115,9 @@ def test_parts_that_the_jaws_would_touch_are_the_program_s(
     line, *_ = output(sdg_program, "detect", "--grasp-model", models["S"], "--json", tmp_path / "touching.png")
     printed = [one.get("jaws_touch", []) for one in json.loads(line)["detections"]]
     assert [one.jaws_touch for one in shape_model.detect(picture)] == printed == [[1], [0]]
+    # Jaws touch no refused part.
+    refused = shape_model.detect(picture, min_score=1.0).refused
+    assert [one.jaws_touch for one in refused] == [[]] * len(refused)
 
 
 def test_several_photos_are_taught_as_by_the_program(sdg_program: Path, tmp_path: Path) -> None:

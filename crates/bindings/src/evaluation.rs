@@ -27,9 +27,9 @@ pub fn evaluate(
     if !(0.0..=1.0).contains(&min_score) {
         return Err(Fault::new(FaultKind::Argument, format!("expected min_score from 0 to 1, found {min_score}")));
     }
-    let perception = model.perception(view.camera.as_ref(), view.region)?;
     let verification = Verification::ByShape;
     on_threads(view.threads, || {
+        let perception = model.perception(view.camera.as_ref(), view.region)?;
         let mut labelled =
             LabelledFolder::read(folder, &perception, label).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
         sdg_files::prepare_folder(report)?;

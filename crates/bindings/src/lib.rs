@@ -11,11 +11,12 @@
 //! ```no_run
 //! use std::path::Path;
 //!
-//! use sdg_bindings::{Model, View, read_picture};
+//! use sdg_bindings::{DEFAULT_MIN_SCORE, Model, View, read_picture};
 //!
 //! # fn main() -> Result<(), sdg_bindings::Fault> {
 //! let model = Model::read(Path::new("part.sdg"))?;
-//! let found = model.detect(&read_picture(Path::new("table.png"), None)?, &View::default())?;
+//! let picture = read_picture(Path::new("table.png"), None)?;
+//! let found = model.detect(&picture, &View::default(), DEFAULT_MIN_SCORE)?;
 //! println!("{}", found.to_json());
 //! # Ok(())
 //! # }

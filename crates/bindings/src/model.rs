@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::camera::Camera;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::threads::on_threads;
+use crate::threads::{check_process, on_threads};
 
 /// The searched region of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -88,8 +88,11 @@ impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// The file cannot be read, is not a grasp model, is damaged, or has another version.
+    /// The file cannot be read, is not a grasp model, is damaged, or has another version; the process was forked from
+    /// one with threads of this library.
     pub fn read(path: &Path) -> Result<Self> {
+        // Reading computes the search's data on several threads.
+        check_process()?;
         sdg_inputs::read_model(path, &Device::flex()).map(Self::from).map_err(|error| {
             let fault = Fault::from(error);
             // A damaged photo in the file counts as a damaged model.
@@ -112,19 +115,19 @@ impl Model {
         &self.model
     }
 
-    /// Detects the part in a picture.
+    /// Detects the part in a picture. Detections with a score of at least `min_score` are accepted.
     ///
     /// # Errors
     /// The errors of [`Self::perception`]; the picture's size differs from the camera's, or the region is not inside
     /// the picture; the number of threads is invalid, or the system refuses them; the process was forked from one with
     /// threads of this library.
-    pub fn detect(&self, picture: &RgbImage, view: &View) -> Result<Detections> {
+    pub fn detect(&self, picture: &RgbImage, view: &View, min_score: f64) -> Result<Detections> {
         on_threads(view.threads, || {
             let perception = self.perception(view.camera.as_ref(), view.region)?;
             let found = perception.detect(picture, Verification::ByShape)?;
             let size = picture.dimensions().into();
             let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
-            let touched = perception.touched_among_accepted(&detections, DEFAULT_MIN_SCORE);
+            let touched = perception.touched_among_accepted(&detections, min_score);
             let record = |(found, jaws_touch): (&Found, Vec<usize>)| Record {
                 found: FoundRecord::new(found, &perception),
                 size: perception.size_of(&found.detection, size),

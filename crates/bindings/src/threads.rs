@@ -55,8 +55,8 @@ pub(crate) fn check_process() -> Result<()> {
     match COMPUTING_PID.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
         Err(first) if first != own => Err(Fault::new(
             FaultKind::Forked,
-            "expected a new process (spawn), found a process that was forked after its parent had detected or taught: the threads of the \
-             parent do not exist in it",
+            "expected a new process (spawn), found a process that was forked after its parent had loaded a model, detected or taught: the threads \
+             of the parent do not exist in it",
         )),
         _ => Ok(()),
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
-use crate::threads::{check_process, on_threads};
+use crate::threads::on_threads;
 
 /// A tracker for one camera's frames; searches run on a separate thread, or on the caller's with `search_frames`.
 pub struct Tracker {
@@ -34,12 +34,12 @@ impl Tracker {
     /// later, identically on every machine; otherwise as soon as the search has ended.
     ///
     /// # Errors
-    /// The errors of [`Model::perception`]; the system refuses a thread; the process was forked from one with threads
-    /// of this library.
+    /// The errors of [`Model::perception`]; the number of threads is invalid, or the system refuses them; the process was
+    /// forked from one with threads of this library.
     pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
-        check_process()?;
-        let perception = model.perception(view.camera.as_ref(), view.region)?;
-        let search_time = search_frames.map_or(SearchTime::AsItTakes, SearchTime::Frames);
+        let perception = on_threads(view.threads, || model.perception(view.camera.as_ref(), view.region))??;
+        let as_it_takes = SearchTime::AsItTakes { threads: view.threads };
+        let search_time = search_frames.map_or(as_it_takes, SearchTime::Frames);
         let tracker = LiveTracker::new(&perception, TrackerConfig::DEFAULT, search_time)?;
         Ok(Self { perception, tracker, threads: view.threads, last_secs: 0.0 })
     }

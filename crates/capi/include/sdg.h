@@ -7,7 +7,8 @@
  *
  * Threads. Every function may be called from any thread at any time, and handles may be shared. A detection uses one thread per core,
  * or sdg_options.threads. Detections that run at the same time share the threads unless they set a number. sdg_last_error is per
- * thread. A process that is forked after a detection or a teaching must call exec, otherwise it gets SDG_ERROR_FORKED.
+ * thread. A process that is forked after a model was loaded, or a detection or teaching was made, must call exec,
+ * otherwise it gets SDG_ERROR_FORKED.
  *
  * Errors. Every function but sdg_abi_version and sdg_last_error returns SDG_OK or the kind of an error; results are written only
  * with SDG_OK. No exception is thrown, and no panic leaves the library.
@@ -68,7 +69,7 @@ typedef int32_t sdg_status;
 /* An internal error of this library. */
 #define SDG_ERROR_INTERNAL 11
 
-/* The process was forked after its parent had detected or taught. */
+/* The process was forked after its parent had loaded a model, detected or taught. */
 #define SDG_ERROR_FORKED 12
 
 /* sdg_picture.order: red first. Ignored for grey. */

@@ -4,7 +4,7 @@ use std::ffi::c_char;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use sdg_bindings::{Camera, Fault, FaultKind, Model, Record, Result};
+use sdg_bindings::{Camera, DEFAULT_MIN_SCORE, Fault, FaultKind, Model, Record, Result};
 
 use crate::border::{check_abi, copy_last_error, copy_text, null, path, status};
 use crate::convert::{copy_rows, detection, picture, teaching, view, write};
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn sdg_detect(
         let view = view(unsafe { options.as_ref() })?;
         // SAFETY: the caller meets the conditions of `# Safety`.
         let pixels = unsafe { self::picture(picture.as_ref().ok_or_else(|| null("picture"))?)? };
-        Ok(Object::Detections(Arc::new(model.detect(&pixels, &view)?)))
+        Ok(Object::Detections(Arc::new(model.detect(&pixels, &view, DEFAULT_MIN_SCORE)?)))
     };
     // SAFETY: the caller meets the conditions of `# Safety`.
     status(|| unsafe { give(detections, "detections", detected) })

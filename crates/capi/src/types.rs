@@ -36,7 +36,7 @@ pub const SDG_ERROR_HANDLE: sdg_status = 9;
 pub const SDG_ERROR_VERSION: sdg_status = 10;
 /// An internal error of this library.
 pub const SDG_ERROR_INTERNAL: sdg_status = 11;
-/// The process was forked after its parent had detected or taught.
+/// The process was forked after its parent had loaded a model, detected or taught.
 pub const SDG_ERROR_FORKED: sdg_status = 12;
 
 /// sdg_picture.order: red first. Ignored for grey.

@@ -126,7 +126,7 @@ impl FrameDetector {
             if frames_wait {
                 config.moves_within = Duration::ZERO;
             }
-            LiveTracker::new(&detector, config, SearchTime::AsItTakes)
+            LiveTracker::new(&detector, config, SearchTime::AsItTakes { threads: None })
         };
         let tracker = tracking.map(follow).transpose()?;
         Ok(Self { detector, verification, tracker, interval, first: None })

@@ -17,18 +17,23 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use image::RgbImage;
+use rayon::ThreadPoolBuilder;
 use sdg_grasp::{PartSearch, SearchOutcome, TrackedPart, Tracker, TrackerConfig};
 
 use crate::error::{CellError, Result};
 use crate::perception::Perception;
 
 const ENDED: CellError = CellError::SearchThread("ended");
+const DOES_NOT_START: CellError = CellError::SearchThread("does not start");
 
 /// The thread and timing of searches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchTime {
     /// On a separate thread, with their real durations.
-    AsItTakes,
+    AsItTakes {
+        /// Number of threads of a search; `None` for one per core.
+        threads: Option<usize>,
+    },
     /// On the caller's thread. The tracker gets the result this number of frames after the searched one, at least one
     /// frame later.
     Frames(u32),
@@ -58,21 +63,27 @@ impl LiveTracker {
     /// Creates a tracker without known parts. [`SearchTime::AsItTakes`] also starts the search thread.
     ///
     /// # Errors
-    /// The operating system provides no thread.
+    /// The operating system provides no threads.
     pub fn new(perception: &Perception, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
         let searches = match search_time {
-            SearchTime::AsItTakes => {
+            SearchTime::AsItTakes { threads } => {
+                let pool = threads.map(|count| ThreadPoolBuilder::new().num_threads(count).build()).transpose();
+                let pool = pool.map_err(|_| DOES_NOT_START)?;
                 let (due, searches) = channel::<PartSearch>();
                 let (finished, done) = channel();
                 let work = move || {
                     for search in searches {
-                        if finished.send(search.run()).is_err() {
+                        let outcome = match &pool {
+                            Some(pool) => pool.install(|| search.run()),
+                            None => search.run(),
+                        };
+                        if finished.send(outcome).is_err() {
                             break;
                         }
                     }
                 };
                 let thread = thread::Builder::new().name("search".to_owned()).spawn(work);
-                let thread = thread.map_err(|_| CellError::SearchThread("does not start"))?;
+                let thread = thread.map_err(|_| DOES_NOT_START)?;
                 Searches::Threaded { due: Some(due), done, thread: Some(thread) }
             }
             SearchTime::Frames(frames) => Searches::Delayed { frames: frames.max(1), outcome: None },

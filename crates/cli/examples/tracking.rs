@@ -97,8 +97,9 @@ fn detect(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry) -> 
 }
 
 fn track(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry, is_paced: bool) -> Result<()> {
-    let mut tracker =
-        LiveTracker::new(&Perception::of_any_camera(model.clone()), TrackerConfig::default(), SearchTime::AsItTakes)?;
+    let perception = Perception::of_any_camera(model.clone());
+    let search_time = SearchTime::AsItTakes { threads: None };
+    let mut tracker = LiveTracker::new(&perception, TrackerConfig::default(), search_time)?;
     let (mut walls, mut all) = (Vec::new(), Vec::new());
     let (mut start, mut cpu_before) = (Instant::now(), process_time()?);
     for (idx, frame) in shown.iter().enumerate() {

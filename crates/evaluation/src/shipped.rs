@@ -46,12 +46,8 @@ pub fn demonstration(object: &str) -> Result<Demonstration> {
 pub fn demonstration_at(object: &ObjectSpec, place: (f64, f64, f64)) -> Result<Demonstration> {
     let shipped = demonstration(&object.name)?;
     let DemonstrationView { view, truth, outline, .. } = demonstration_view_at(object, place)?;
-    let annotation = Annotation {
-        bbox: outline.bounds(),
-        grasp: Some(truth.line),
-        outline: Some(outline),
-        ..shipped.annotation
-    };
+    let annotation =
+        Annotation { bbox: outline.bounds(), grasp: Some(truth.line), outline: Some(outline), ..shipped.annotation };
     Ok(Demonstration { image: view.image, annotation })
 }
 

@@ -52,21 +52,31 @@ pub(crate) fn line() -> GraspLine {
     GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0))
 }
 
-/// A photo of the part, of this size, and its marks.
-pub(crate) fn demonstration(size: [u32; 2]) -> Demonstration {
-    let outline = outline();
+/// A photo of the part at a pose, of this size, and its marks.
+pub(crate) fn demonstration_at(size: [u32; 2], pose: &PlanarSimilarity) -> Demonstration {
+    let outline = outline().transformed(pose);
     let annotation = Annotation {
         label: "L".into(),
         bbox: outline.bounds(),
-        grasp: Some(line()),
+        grasp: Some(line().transformed(pose)),
         jaw_width: None,
         outline: Some(outline),
     };
-    Demonstration { image: picture(size, &[PlanarSimilarity::IDENTITY]), annotation }
+    Demonstration { image: picture(size, &[*pose]), annotation }
+}
+
+/// A photo of the part, of this size, and its marks.
+pub(crate) fn demonstration(size: [u32; 2]) -> Demonstration {
+    demonstration_at(size, &PlanarSimilarity::IDENTITY)
+}
+
+/// Model S taught from photos.
+pub(crate) fn taught(demonstrations: &[Demonstration]) -> GraspModel {
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model
 }
 
 /// Model S taught from a photo of this size.
 pub(crate) fn model(size: [u32; 2]) -> GraspModel {
-    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
-    teach(&[demonstration(size)], &options, &mut |_| ControlFlow::Continue(())).unwrap().model
+    taught(&[demonstration(size)])
 }

@@ -120,10 +120,10 @@ impl GraspModel {
         if max_detections == 0 {
             return Err(GraspError::InvalidConfig { name: "most detections", expected: "at least 1", found: 0.0 });
         }
-        let is_cut = self.facts.region.is_some();
         self.with_check(|check| {
             check.max_detections = max_detections;
-            check.search.max_matches = max_matches(max_detections, is_cut);
+            // All matches are scored before the best ones are kept.
+            check.search.max_matches = max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS);
         })
     }
 
@@ -133,7 +133,7 @@ impl GraspModel {
     /// # Errors
     /// A region without pixels. A region that names the size of its pictures must also lie within them and be large
     /// enough for the part; other regions are checked with each picture.
-    pub fn with_region(self, region: Option<SearchRegion>) -> Result<Self> {
+    pub fn with_region(mut self, region: Option<SearchRegion>) -> Result<Self> {
         if self.facts.region == region {
             return Ok(self);
         }
@@ -141,15 +141,8 @@ impl GraspModel {
             // A model with known lengths has plan views as demonstrations, whose pixels are not the picture's.
             check_region(region, self.facts.lengths.is_none().then_some(&self.demonstrations))?;
         }
-        let CheckConfig { search, max_detections, .. } = self.demonstrations[0].check();
-        let wanted = max_matches(*max_detections, region.is_some());
-        // A changed configuration requires a new search, which takes milliseconds to prepare.
-        let mut model = match search.max_matches == wanted {
-            true => self,
-            false => self.with_check(|check| check.search.max_matches = wanted)?,
-        };
-        model.facts.region = region;
-        Ok(model)
+        self.facts.region = region;
+        Ok(self)
     }
 
     /// The searched region of pictures; `None` for whole pictures.
@@ -336,31 +329,26 @@ impl GraspModel {
 
     /// The verdict's inputs for a sighting.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
-        let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
+        let PlacedDemonstration { demonstration_idx, evidence, log_size, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
-        Clues { evidence, log_size, network, resemblance: self.score_calibration.resemblance }
+        let resemblance = self.score_calibration.resemblance;
+        Clues { demonstration_idx, evidence, log_size, network, resemblance }
     }
 
-    /// The scores of all sightings in one picture of a sequence. `earlier_log_size` is the size of parts in earlier
-    /// pictures, as in [`Clues::log_size`].
+    /// The scores of all sightings in one picture of a sequence. `earlier_log_sizes` are the sizes of parts in earlier
+    /// pictures, by demonstration, as in [`Clues::log_size`].
     pub(crate) fn judge_in_sequence(
         &self,
         clues: &[Clues],
-        earlier_log_size: Option<f64>,
+        earlier_log_sizes: &[(usize, f64)],
     ) -> Vec<(f64, Contributions)> {
-        judge_picture_of_sequence(clues, earlier_log_size, &self.demonstrations[0].check().score)
+        judge_picture_of_sequence(clues, earlier_log_sizes, &self.demonstrations[0].check().score)
     }
 
     /// Number of keypoints of a detection of this model.
     pub(crate) fn num_keypoints(&self) -> usize {
         if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }
     }
-}
-
-/// Maximum number of matches of a search for this many detections. If only a region is searched, better matches outside
-/// must not displace matches inside.
-fn max_matches(max_detections: usize, is_cut: bool) -> usize {
-    if is_cut { max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS) } else { max_detections }
 }
 
 /// Keeps the best of several detections of the same part, which is recognised by the overlap of outlines or, without

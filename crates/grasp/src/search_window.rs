@@ -141,7 +141,7 @@ impl SearchWindow {
 
 /// Length and width of a polygon: the largest distance between two points, and the smallest distance between two
 /// parallel lines that enclose the polygon.
-fn extents(polygon: &Polygon) -> [f64; 2] {
+pub(crate) fn extents(polygon: &Polygon) -> [f64; 2] {
     let hull = convex_hull(polygon.vertices.iter().copied());
     let distances = hull.iter().flat_map(|a| hull.iter().map(move |b| (b - a).norm()));
     let length = distances.fold(0.0, f64::max);

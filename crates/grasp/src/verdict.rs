@@ -139,8 +139,9 @@ impl Contributions {
 /// The known facts of a detection before it is scored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clues {
+    pub(crate) demonstration_idx: usize,
     pub(crate) evidence: Evidence,
-    /// ln of the size over the nearest nominal size.
+    /// ln of the size over the nearest nominal size of this demonstration.
     pub(crate) log_size: f64,
     /// ln of the ratio of two likelihoods of the network's output, on the part and elsewhere; `None` without a network.
     pub(crate) network: Option<f64>,
@@ -155,32 +156,36 @@ const MIN_RIVALS_SHARE: f64 = 0.03;
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
 /// The scores of all detections in one picture and their contributions. If the part's size is unknown, each detection
-/// is first scored alone, then relative to the size of the best one, since the parts of one picture are equally far
-/// from the camera.
+/// is first scored alone, then relative to the size of the best one with the same demonstration, since the parts of one
+/// picture are equally far from the camera. Photos may have been taken at different distances, so that sizes relative
+/// to different photos are not compared.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
-    let surest = || {
-        clues
-            .iter()
-            .map(|clues| (judge(clues, None, config).0, clues.log_size))
-            .filter(|(score, _)| *score >= MIN_REFERENCE_SCORE)
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, log_size)| log_size)
+    if config.is_size_known {
+        return clues.iter().map(|clues| judge(clues, Some(0.0), config)).collect();
+    }
+    let alone: Vec<(f64, &Clues)> = clues.iter().map(|clues| (judge(clues, None, config).0, clues)).collect();
+    let surest = |demonstration_idx: usize| {
+        let of_it = alone.iter().filter(|(_, other)| other.demonstration_idx == demonstration_idx);
+        let sure = of_it.filter(|(score, _)| *score >= MIN_REFERENCE_SCORE);
+        sure.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, clues)| clues.log_size)
     };
-    let reference = if config.is_size_known { Some(0.0) } else { surest() };
-    clues.iter().map(|clues| judge(clues, reference, config)).collect()
+    clues.iter().map(|clues| judge(clues, surest(clues.demonstration_idx), config)).collect()
 }
 
-/// As [`judge_picture`], for a picture of a sequence; `earlier_log_size` is the size of parts in earlier pictures, as
-/// [`Clues::log_size`].
+/// As [`judge_picture`], for a picture of a sequence; `earlier_log_sizes` are the sizes of parts in earlier pictures, by
+/// demonstration, as [`Clues::log_size`].
 pub(crate) fn judge_picture_of_sequence(
     clues: &[Clues],
-    earlier_log_size: Option<f64>,
+    earlier_log_sizes: &[(usize, f64)],
     config: &ScoreConfig,
 ) -> Vec<(f64, Contributions)> {
-    let Some(earlier) = earlier_log_size.filter(|_| !config.is_size_known) else {
+    if config.is_size_known || earlier_log_sizes.is_empty() {
         return judge_picture(clues, config);
+    }
+    let earlier = |clues: &Clues| {
+        earlier_log_sizes.iter().find(|(idx, _)| *idx == clues.demonstration_idx).map(|(_, log_size)| *log_size)
     };
-    clues.iter().map(|clues| judge(clues, Some(earlier), config)).collect()
+    clues.iter().map(|clues| judge(clues, earlier(clues), config)).collect()
 }
 
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {
@@ -242,7 +247,7 @@ pub(crate) mod tests {
             outside: 0.0,
             close: Some(look(2.0)),
         };
-        Clues { evidence, log_size: 0.0, network: None, resemblance: 0.34 }
+        Clues { demonstration_idx: 0, evidence, log_size: 0.0, network: None, resemblance: 0.34 }
     }
 
     fn score(clues: Clues) -> f64 {
@@ -294,6 +299,20 @@ pub(crate) mod tests {
         assert!(changed(|c| c.network = Some(-0.9)) < 0.0);
         // Networks also propose look-alikes of the part.
         assert_eq!(changed(|c| c.network = Some(0.9)), 0.0);
+    }
+
+    #[test]
+    fn sizes_relative_to_different_photos_are_not_compared() {
+        let [one, other] = [0, 1].map(|idx| Clues { demonstration_idx: idx, log_size: 0.18 * idx as f64, ..clear() });
+        let sizes = |clues: &[Clues]| {
+            let judged = judge_picture(clues, &ScoreConfig::DEFAULT);
+            judged.iter().map(|(_, evidence)| evidence.size).collect::<Vec<_>>()
+        };
+        assert_eq!(sizes(&[one, other]), [0.0; 2]);
+        assert!(sizes(&[one, Clues { demonstration_idx: 0, ..other }])[1] < -1.0);
+        // In a sequence, the reference is the size of earlier parts found with the same photo.
+        let in_sequence = judge_picture_of_sequence(&[one, other], &[(1, 0.0)], &ScoreConfig::DEFAULT);
+        assert!(in_sequence[0].1.size == 0.0 && in_sequence[1].1.size < -1.0);
     }
 
     #[test]

@@ -131,9 +131,14 @@ impl Grasping {
         Ok(())
     }
 
+    /// Whether a grasp is running.
+    pub(super) fn is_running(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| !running.is_finished())
+    }
+
     /// The result of the grasp; `None` while it is running.
     pub(super) fn finished(&mut self) -> Option<GraspResponse> {
-        if !self.running.as_ref().is_some_and(JoinHandle::is_finished) {
+        if self.is_running() {
             return None;
         }
         match self.running.take()?.join() {

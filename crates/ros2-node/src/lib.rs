@@ -43,7 +43,7 @@ use pictures::PictureReader;
 use publishing::Topics;
 use sdg_inputs::one_line;
 use searching::Searcher;
-use services::{Change, Services};
+use services::Services;
 
 /// Interval of checks for requests while there is no picture.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -60,11 +60,12 @@ pub fn run(
 ) -> Result<()> {
     let lines = Arc::<Lines>::default();
     let mut topics = Topics::open(&mut node, &lines)?;
+    let needs_lengths = !matches!(settings.camera_pose, CameraPoseSource::Unknown);
     let camera_pose = CameraPoseReader::open(&mut node, settings.camera_pose, settings.max_transform_age_secs, &lines)?;
     let reader = PictureReader::open(&mut node, settings.is_compressed, settings.picture_qos, settings.queue, &lines)?;
     let grasping = arm.map(|(grasp, arm)| Grasping::new(grasp, arm, Arc::clone(&reader.shared), is_interrupted));
     let mut services = Services::open(&mut node, settings.teach, settings.trigger_teaching, grasping, &lines)?;
-    let mut searcher = Searcher::new(settings.model, settings.min_score);
+    let mut searcher = Searcher::new(settings.model, settings.min_score, needs_lengths);
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
     while !is_interrupted() {
         if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
@@ -84,12 +85,12 @@ pub fn run(
                 }
             }
         }
-        if let Some(Change::UseModel(path)) = services.work(&reader.topic, searcher.model())
-            && let Err(error) = searcher.change_model(&path, &settings.device)
-        {
-            lines.complain(&one_line(&error));
+        if let Some(taught) = services.work(&reader.topic, searcher.model()) {
+            let changed = searcher.change_model(&taught.path, &settings.device).map_err(|error| one_line(&error));
+            services.answer_use(&taught, changed);
         }
         topics.diagnose(&reader, searcher.model().is_some());
     }
+    services.finish();
     Ok(())
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_cell::{Found, Perception};
-use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspModel, Verification};
+use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspError, GraspModel, Verification};
 use sdg_ros2::found::FoundPart;
 use sdg_ros2::messages::Header;
 
@@ -19,6 +19,8 @@ pub(super) struct Searcher {
     model: Option<GraspModel>,
     perception: Option<Perception>,
     min_score: f64,
+    /// Whether the pictures have camera poses, which a model without lengths cannot use.
+    needs_lengths: bool,
 }
 
 /// A picture's result.
@@ -44,17 +46,22 @@ impl Searched {
 }
 
 impl Searcher {
-    pub(super) fn new(model: Option<GraspModel>, min_score: f64) -> Self {
+    pub(super) fn new(model: Option<GraspModel>, min_score: f64, needs_lengths: bool) -> Self {
         let perception = model.clone().map(Perception::of_any_camera);
-        Self { model, perception, min_score }
+        Self { model, perception, min_score, needs_lengths }
     }
 
     /// Replaces the model.
     ///
     /// # Errors
-    /// An error if the file is not a model.
+    /// An error if the file is not a model, or if the model has no lengths although the pictures have camera poses; the
+    /// previous model then remains.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
-        *self = Self::new(Some(sdg_inputs::read_model(path, device)?), self.min_score);
+        let model = sdg_inputs::read_model(path, device)?;
+        if self.needs_lengths && model.facts().lengths.is_none() {
+            return Err(GraspError::NoLengths.into());
+        }
+        *self = Self::new(Some(model), self.min_score, self.needs_lengths);
         Ok(())
     }
 

@@ -14,6 +14,7 @@ use sdg_ros2::messages::{
     TriggerResponse,
 };
 
+use crate::POLL_INTERVAL;
 use crate::grasping::Grasping;
 use crate::lines::Lines;
 use crate::searching::Searched;
@@ -87,10 +88,11 @@ struct Detecting {
     deadline: Instant,
 }
 
-/// A change of the node's state by a service.
-pub(super) enum Change {
-    /// Use this model for detection.
-    UseModel(PathBuf),
+/// A taught model that the node is to use. Its client has no answer yet.
+pub(super) struct Taught {
+    pub(super) path: PathBuf,
+    asker: Client,
+    secs: f64,
 }
 
 /// All services.
@@ -131,8 +133,9 @@ impl Services {
         })
     }
 
-    /// Receives requests and sends finished responses.
-    pub(super) fn work(&mut self, topic: &str, model: Option<&sdg_grasp::GraspModel>) -> Option<Change> {
+    /// Receives requests and sends finished responses. Returns a taught model that is to be used, whose client
+    /// [`Self::answer_use`] answers.
+    pub(super) fn work(&mut self, topic: &str, model: Option<&sdg_grasp::GraspModel>) -> Option<Taught> {
         self.take_detections();
         self.give_up_detections(topic);
         self.take_grasps(model);
@@ -208,12 +211,27 @@ impl Services {
                 }
             }
         }
-        if let Some(asker) = self.grasping
-            && let Some(answer) = grasping.finished()
-        {
-            self.grasping = None;
-            let (success, message) = (answer.success, answer.message.clone());
-            pair.answer(asker, answer, success, message, &self.lines);
+        self.answer_grasp();
+    }
+
+    /// Answers the client of a finished grasp; returns the reason if the grasp failed.
+    fn answer_grasp(&mut self) -> Option<String> {
+        let (pair, grasping) = self.grasp.as_mut()?;
+        let answer = grasping.finished()?;
+        let (success, message) = (answer.success, answer.message.clone());
+        if let Some(asker) = self.grasping.take() {
+            pair.answer(asker, answer, success, message.clone(), &self.lines);
+        }
+        (!success).then_some(message)
+    }
+
+    /// Waits for a running grasp, which stops when the node is interrupted, because the arm may still move until then.
+    pub(super) fn finish(&mut self) {
+        while self.grasp.as_ref().is_some_and(|(_, grasping)| grasping.is_running()) {
+            std::thread::sleep(POLL_INTERVAL);
+        }
+        if let Some(why) = self.answer_grasp() {
+            self.lines.complain(&why);
         }
     }
 
@@ -237,22 +255,26 @@ impl Services {
         }
     }
 
-    fn finish_teaching(&mut self) -> Option<Change> {
+    fn finish_teaching(&mut self) -> Option<Taught> {
         let (asker, mut teaching) = self.teaching.take()?;
         let Some(taught) = teaching.finished() else {
             self.teaching = Some((asker, teaching));
             return None;
         };
-        let is_used = teaching.is_used;
-        let (path, secs) = match taught {
-            Ok(done) => done,
-            Err(message) => {
-                self.answer_teaching(asker, Err(message));
-                return None;
-            }
-        };
-        self.answer_teaching(asker, Ok((path.as_path(), secs)));
-        is_used.then_some(Change::UseModel(path))
+        match taught {
+            Ok((path, secs)) if teaching.is_used => return Some(Taught { path, asker, secs }),
+            Ok((path, secs)) => self.answer_teaching(asker, Ok((path.as_path(), secs))),
+            Err(message) => self.answer_teaching(asker, Err(message)),
+        }
+        None
+    }
+
+    /// Answers the client of a taught model; `changed` is an error if the node cannot use it.
+    pub(super) fn answer_use(&self, taught: &Taught, changed: Result<(), String>) {
+        let Taught { path, asker, secs } = taught;
+        let answer = changed.map(|()| (path.as_path(), *secs));
+        let not_used = |why: String| format!("{} was taught, but the node does not use it: {why}", path.display());
+        self.answer_teaching(*asker, answer.map_err(not_used));
     }
 
     fn answer_teaching(&self, asker: Client, taught: Result<(&Path, f64), String>) {

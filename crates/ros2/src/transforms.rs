@@ -40,6 +40,11 @@ enum Motion {
     Moving(VecDeque<(f64, Isometry3<f64>)>),
 }
 
+/// A frame's name without the slash that tf 1 wrote before names.
+fn frame(name: &str) -> &str {
+    name.strip_prefix('/').unwrap_or(name)
+}
+
 impl Transforms {
     /// Starts without transforms. At a time outside the stored history of a moving frame, the nearest pose is used if
     /// its time differs by at most `max_age_secs`.
@@ -53,9 +58,8 @@ impl Transforms {
     }
 
     fn add_one(&mut self, transform: &crate::messages::TransformStamped, is_static: bool) -> bool {
-        // tf 1 wrote a slash before names.
-        let name = |text: &str| text.strip_prefix('/').unwrap_or(text).to_owned();
-        let (parent, child) = (name(&transform.header.frame_id), name(&transform.child_frame_id));
+        let [parent, child] =
+            [&transform.header.frame_id, &transform.child_frame_id].map(|name| frame(name).to_owned());
         let Some(parent_from_child) = transform.transform.isometry() else { return false };
         let is_full = self.frames.len() >= MAX_FRAMES && !self.frames.contains_key(&child);
         if parent.is_empty() || child.is_empty() || parent == child || is_full {
@@ -93,6 +97,7 @@ impl Transforms {
     /// # Errors
     /// [`RosError::Transform`] for frames without a connection, and for a pose that is too old or too new for the time.
     pub fn lookup(&self, target: &str, source: &str, time: Time) -> Result<Isometry3<f64>, RosError> {
+        let (target, source) = (frame(target), frame(source));
         let refused =
             |why: String| RosError::Transform { target_frame: target.into(), source_frame: source.into(), why };
         let of_target = self.ancestors(target);
@@ -199,6 +204,7 @@ mod tests {
         let back = transforms.lookup("camera", "table", at(10.0)).unwrap();
         assert!((back * from_table).translation.vector.norm() < 1e-9);
         assert_eq!(transforms.lookup("hand", "hand", at(10.0)).unwrap(), Isometry3::identity());
+        assert_eq!(transforms.lookup("/base", "/camera", at(10.0)).unwrap(), camera);
     }
 
     #[test]

@@ -144,19 +144,21 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
 
 /// Teaches with progress on standard error, writes the model file, and tests the model on held-out samples.
 ///
+/// `own` is a model file of this process that may be replaced, as in [`sdg_files::extend`].
+///
 /// # Errors
 /// Errors of teaching as [`GraspError`]; the file cannot be written; the test fails.
 pub(super) fn teach_to_file(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
-    out: &Path,
+    (out, own): (&Path, Option<&Path>),
     interrupt: &Interrupt,
 ) -> Result<(TaughtFile, HeldBackFigures)> {
     let mut progress = TeachingProgress::new(interrupt.clone());
     let taught = TaughtFile::teach(demonstrations, options, &mut |event| progress.show(event));
     progress.finish();
     let file = taught?;
-    sdg_files::write(out, &file.bytes)?;
+    sdg_files::extend(out, own, &file.bytes)?;
     let figures = file.figures(demonstrations, options.seed)?;
     Ok((file, figures))
 }
@@ -177,7 +179,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     }
     let report = read_base_weights(args, &mut options)?;
 
-    let taught = teach_to_file(&demonstrations, &options, &args.out, &Interrupt::watch());
+    let taught = teach_to_file(&demonstrations, &options, (&args.out, None), &Interrupt::watch());
     let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
         Some(GraspError::NeedsBaseWeights { preset }) if *preset == Preset::Edge.name() => {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()

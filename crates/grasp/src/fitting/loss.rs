@@ -140,7 +140,10 @@ mod tests {
     fn pose(edges: f64, instance_idx: Option<usize>) -> PoseObservation {
         let evidence =
             Evidence { edges, surface: Some(0.0), hue_shift: 0.0, visible: 0.0, outside: 0.0, close: Some(look(0.0)) };
-        PoseObservation { clues: Clues { evidence, log_size: 0.0, network: None, resemblance: 0.3 }, instance_idx }
+        PoseObservation {
+            clues: Clues { demonstration_idx: 0, evidence, log_size: 0.0, network: None, resemblance: 0.3 },
+            instance_idx,
+        }
     }
 
     #[test]

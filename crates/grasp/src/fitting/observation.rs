@@ -119,7 +119,7 @@ impl<'a> PreparedPart<'a> {
             }
             let PlacedDemonstration { evidence, log_size, .. } = placed;
             poses.push(PoseObservation {
-                clues: Clues { evidence, log_size, network: None, resemblance },
+                clues: Clues { demonstration_idx: 0, evidence, log_size, network: None, resemblance },
                 instance_idx,
             });
         }

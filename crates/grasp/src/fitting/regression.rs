@@ -294,7 +294,7 @@ mod tests {
                 outside: 0.0,
                 close: Some(look(2.0)),
             };
-            let clues = Clues { evidence, log_size: 0.0, network: None, resemblance: 0.33 };
+            let clues = Clues { demonstration_idx: 0, evidence, log_size: 0.0, network: None, resemblance: 0.33 };
             PoseObservation { clues, instance_idx }
         };
         let pictures = (0..40)

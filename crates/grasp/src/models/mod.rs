@@ -104,6 +104,18 @@ impl Network {
         Some(Self { reading, ..self })
     }
 
+    /// The network for resized demonstrations.
+    ///
+    /// # Errors
+    /// A demonstration with too few features for model D.
+    pub(crate) fn with_demonstrations(self, demonstrations: &[TaughtDemonstration]) -> Result<Self> {
+        let reading = match self.reading {
+            Reading::Mask(_) => Reading::Mask(MaskMatcher::new(demonstrations)?),
+            other => other,
+        };
+        Ok(Self { reading, ..self })
+    }
+
     /// The network as stored in a file: every weight rounded to half precision.
     #[cfg(feature = "teach")]
     pub(crate) fn rounded(self) -> Self {

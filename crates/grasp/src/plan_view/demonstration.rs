@@ -3,7 +3,7 @@
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
-use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
+use sdg_geometry::{BoundingBox, GraspLine, PlanView, PlanarGrasp, Polygon, PosedCamera};
 use sdg_shape::PlanViewMap;
 
 use super::region::RegionInPlanView;
@@ -120,12 +120,13 @@ fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Res
         Some(line) => Some(GraspLine::new(shown(&line.start)?, shown(&line.end)?)),
         None => None,
     };
-    // The jaw width grows by the same factor as the marks.
-    let jaw_width = match (marked.jaw_width, &marked.grasp, &grasp) {
-        (Some(width), Some(before), Some(after)) => {
-            Some(width * (after.end - after.start).norm() / (before.end - before.start).norm())
+    // The jaws lie beside the line, where a tilted camera has another scale than along it.
+    let jaw_width = match (marked.jaw_width, &marked.grasp) {
+        (Some(width), Some(line)) => {
+            let [one, other] = PlanarGrasp::from_line(line, width).jaws();
+            Some((shown(&one)? - shown(&other)?).norm())
         }
-        (width, ..) => width,
+        (width, _) => width,
     };
     Ok(Annotation {
         label: marked.label.clone(),
@@ -134,4 +135,38 @@ fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Res
         jaw_width,
         outline,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+    use sdg_geometry::PinholeCamera;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_jaw_width_marked_in_a_tilted_picture_is_a_length_on_the_plane() {
+        let tilt = 20f64.to_radians();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI + tilt);
+        let camera = PosedCamera {
+            intrinsics: PinholeCamera::WRIST,
+            world_from_camera: Isometry3::from_parts(Translation3::new(0.0, -0.6 * tilt.sin(), 0.6 * tilt.cos()), turn),
+        };
+        let view = PlanView::of(&camera, 0.0, 1000.0, None, 6_000_000).unwrap();
+        // The line along the slant and across it, with jaws 60 mm apart.
+        for along in [[1.0, 0.0], [0.0, 1.0]] {
+            let [x, y] = along;
+            let seen = |u: f64, v: f64| camera.project(&Point3::new(u * x - v * y, u * y + v * x, 0.0)).unwrap();
+            let grasp = GraspLine::new(seen(-0.02, 0.0), seen(0.02, 0.0));
+            let marked = Annotation {
+                label: "part".to_owned(),
+                bbox: BoundingBox::around([seen(-0.03, -0.03), seen(0.03, 0.03)]).unwrap(),
+                grasp: Some(grasp),
+                jaw_width: Some((seen(0.0, 0.03) - seen(0.0, -0.03)).norm()),
+                outline: None,
+            };
+            let width = annotation(&marked, &camera, &view).unwrap().jaw_width.unwrap();
+            assert!((width - 60.0).abs() < 0.6, "{along:?}: {width}");
+        }
+    }
 }

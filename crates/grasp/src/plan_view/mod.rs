@@ -203,7 +203,7 @@ impl PlanViewDetector {
     /// Whether a detection in the plan view lies in the searched region of the picture; always true for whole pictures.
     pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
         let has = |region: &RegionInPlanView| {
-            self.in_picture(detection.clone()).is_some_and(|seen| seen.lies_in(&region.region))
+            self.placed(detection.clone()).is_some_and(|placed| placed.detection.lies_in(&region.region))
         };
         self.region.as_ref().is_none_or(has)
     }

@@ -134,11 +134,7 @@ mod tests {
         measured_of(MARK_HEIGHT_M, photos, further_slants)
     }
 
-    fn measured_of(
-        mark_height_m: f64,
-        photos: &[Demonstration],
-        further_slants: &[[f64; 2]],
-    ) -> Option<EdgeHeight> {
+    fn measured_of(mark_height_m: f64, photos: &[Demonstration], further_slants: &[[f64; 2]]) -> Option<EdgeHeight> {
         let level = Lengths::of_level_photos(PIXELS_PER_M, mark_height_m, 0.005);
         let lengths = Lengths { slant: SLANTS[0], further_slants: further_slants.to_vec(), ..level };
         let taught: Vec<_> = photos.iter().map(|photo| TaughtDemonstration::new(photo).unwrap()).collect();

@@ -37,6 +37,9 @@ pub(crate) struct NegativeScenes {
 /// in a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
+/// Minimum length of the part in a halved photo: shorter ones have too few edges to compare. Chosen by hand.
+const MIN_PART_PX: f64 = 40.0;
+
 impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.
     ///
@@ -83,10 +86,15 @@ impl NegativeScenes {
     }
 }
 
-/// The demonstration, halved until its photo is small enough.
+/// The demonstration, halved until its photo is small enough or the part would be too small.
 fn shrunk(demonstration: &Demonstration) -> Demonstration {
     let mut shrunk = demonstration.clone();
-    while u64::from(shrunk.image.width()) * u64::from(shrunk.image.height()) > MAX_PIXELS {
+    let is_large = |shrunk: &Demonstration| {
+        let part = &shrunk.annotation.bbox;
+        u64::from(shrunk.image.width()) * u64::from(shrunk.image.height()) > MAX_PIXELS
+            && part.width().max(part.height()) >= 2.0 * MIN_PART_PX
+    };
+    while is_large(&shrunk) {
         let half = scaling(0.5);
         let Annotation { label, bbox, grasp, jaw_width, outline } = shrunk.annotation;
         shrunk = Demonstration {

@@ -59,18 +59,23 @@ pub(super) enum Match {
     Other,
     /// The same part at about the track's pose.
     Confirms,
-    /// The same part at another pose of better agreement.
+    /// The same part at another pose, or found with another demonstration, of better agreement.
     Corrects,
-    /// The same part at another pose that does not agree better, or that differs only by the part's symmetry.
+    /// The same part, but the pose does not agree better, or differs only by the part's symmetry.
     Disagrees,
 }
 
 /// Compares a detection with the track's pose in the detection's frame.
 pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placement, past: &PastPose) -> Match {
-    let demonstration = &detector.model().demonstrations()[placement.demonstration_idx];
+    let demonstration = &detector.model().demonstrations()[past.demonstration_idx];
     let there = demonstration.outline(&past.image_from_cutout);
     if !found.detection.outline.as_ref().is_some_and(|outline| are_outlines_of_same_part(outline, &there)) {
         return Match::Other;
+    }
+    let is_better = placement.agreement > past.agreement + MIN_GAIN;
+    if placement.demonstration_idx != past.demonstration_idx {
+        // The poses belong to different cut-outs.
+        return if is_better { Match::Corrects } else { Match::Disagrees };
     }
     let difference = past.image_from_cutout.inverse().compose(&placement.image_from_cutout);
     let middle = demonstration.marks.grasp.center();
@@ -79,7 +84,6 @@ pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placem
         return Match::Confirms;
     }
     let seen = detector.model().facts().symmetry.visible(difference.angle).radians().abs();
-    let is_better = placement.agreement > past.agreement + MIN_GAIN;
     if is_better && (apart_px > FAR_PX || seen > FAR_RAD) { Match::Corrects } else { Match::Disagrees }
 }
 

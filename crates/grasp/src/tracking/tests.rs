@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::{Rgb, RgbImage};
+use sdg_demonstration::Demonstration;
 use sdg_geometry::PlanarSimilarity;
 
 use super::*;
@@ -196,6 +197,51 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     // A movement of one pixel is followed.
     let moved = tracker.frame(Arc::new(picture(&[at(101.3, 90.8, 17.0)])), Duration::from_millis(1200));
     assert_at(&moved[0], &at(101.3, 90.8, 17.0), "moved");
+}
+
+/// A search finds a part with another photo than its track, from which its pose differs by the difference of the photos.
+#[test]
+fn a_part_found_with_another_photo_stays_where_it_is() {
+    let photos = [drawn_part::demonstration(SIZE), drawn_part::demonstration_at(SIZE, &at(90.0, 70.0, 5.0))];
+    let of = |photos: &[Demonstration]| Tracker::new(drawn_part::taught(photos).into(), TrackerConfig::default());
+    let (mut tracker, mut with_first, mut with_second) = (of(&photos), of(&photos[..1]), of(&photos[1..]));
+    let pose = at(150.0, 110.0, 30.0);
+    let picture = Arc::new(picture(&[pose]));
+    // The search of a tracker with one photo, as if the tracker with both photos had found the part with this photo.
+    let searched = |single: &mut Tracker, demonstration_idx: usize| {
+        let mut outcome = single.search_due().unwrap().run();
+        for found in outcome.found.as_mut().unwrap() {
+            found.detection.demonstration_idx = demonstration_idx;
+            found.placement.as_mut().unwrap().demonstration_idx = demonstration_idx;
+        }
+        outcome
+    };
+    let mut found = Vec::new();
+    for number in 0..60u32 {
+        let time = PERIOD * number;
+        let parts = tracker.frame(Arc::clone(&picture), time);
+        with_first.frame(Arc::clone(&picture), time);
+        with_second.frame(Arc::clone(&picture), time);
+        for part in &parts {
+            assert_at(part, &pose, &format!("frame {number}"));
+        }
+        found.push(parts.len());
+        if tracker.search_due().is_some() {
+            let outcome = if number == 0 { searched(&mut with_first, 0) } else { searched(&mut with_second, 1) };
+            tracker.take_outcome(outcome).unwrap();
+        }
+    }
+    assert_eq!(found[1..], [1; 59]);
+}
+
+#[test]
+fn parts_for_which_no_place_is_free_do_not_wait() {
+    let poses: Vec<_> = [(60.0, 60.0), (160.0, 60.0), (260.0, 60.0), (60.0, 170.0)].map(|(x, y)| at(x, y, 0.0)).into();
+    let still = Arc::new(picture(&poses));
+    let mut tracker = tracker();
+    tracker.config.max_parts = 2;
+    let all = run_with_searches(&mut tracker, (0..90).map(|_| Arc::clone(&still)), std::iter::repeat(12));
+    assert_eq!((all[89].len(), tracker.arriving.len()), (2, 0));
 }
 
 #[test]

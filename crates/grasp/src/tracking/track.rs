@@ -78,6 +78,8 @@ pub(super) enum Standing {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PastPose {
     pub(super) number: u64,
+    /// The demonstration to whose cut-out the poses belong.
+    pub(super) demonstration_idx: usize,
     /// The pose by edges alone.
     pub(super) by_edges: PlanarSimilarity,
     pub(super) image_from_cutout: PlanarSimilarity,
@@ -281,6 +283,11 @@ impl Track {
         }
     }
 
+    /// The demonstration with which the part was found.
+    pub(super) fn demonstration_idx(&self) -> usize {
+        self.part.demonstration_idx
+    }
+
     /// ln of the part's size over the nearest nominal size, smoothed over frames.
     pub(super) fn log_size(&self) -> f64 {
         self.part.log_size(self.steady_scale)
@@ -345,7 +352,8 @@ impl Track {
             self.history.pop_front();
         }
         let Followed { by_edges, image_from_cutout, agreement, .. } = *followed;
-        self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
+        let demonstration_idx = self.part.demonstration_idx;
+        self.history.push_back(PastPose { number, demonstration_idx, by_edges, image_from_cutout, agreement });
     }
 
     /// The track's pose in a frame, if it was followed there.

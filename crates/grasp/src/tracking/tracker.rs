@@ -178,7 +178,7 @@ impl Tracker {
                     self.detector.model().clues(&track.sighting(&self.detector, followed, *close))
                 })
                 .collect();
-            let judged = self.detector.model().judge_in_sequence(&clues, self.log_size());
+            let judged = self.detector.model().judge_in_sequence(&clues, &self.log_sizes());
             let mut is_accepted = judged.iter().map(|(score, _)| *score >= ACCEPTED);
             arrived.retain(|_| is_accepted.next() == Some(true));
         }
@@ -206,10 +206,10 @@ impl Tracker {
         Some((track, Refined { followed, close }, shown))
     }
 
-    /// The reference size: parts of one sequence have one size, like parts of one picture, so that a look-alike of
-    /// another size is not a lost part.
-    fn log_size(&self) -> Option<f64> {
-        self.tracks.first().map(|tracked| tracked.track.log_size())
+    /// The reference sizes by demonstration, the oldest track's first: parts of one sequence have one size, like parts of
+    /// one picture, so that a look-alike of another size is not a lost part.
+    fn log_sizes(&self) -> Vec<(usize, f64)> {
+        self.tracks.iter().map(|tracked| (tracked.track.demonstration_idx(), tracked.track.log_size())).collect()
     }
 
     fn parts(&self) -> Vec<TrackedPart> {
@@ -291,7 +291,12 @@ impl Tracker {
         }
         self.searching = None;
         let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(()) };
-        for found in outcome.found? {
+        let all_found = outcome.found?;
+        // This search has the parts of the earlier one in a newer frame.
+        self.arriving.clear();
+        let num_followed = self.tracks.iter().filter(|tracked| tracked.part.is_followed()).count();
+        let mut num_free = self.config.max_parts.saturating_sub(num_followed);
+        for found in all_found {
             let Some(placement) = &found.placement else { continue };
             let arriving = || Track::new(&self.detector, &frame, &found);
             match self.matched(&found, frame.number) {
@@ -305,7 +310,10 @@ impl Tracker {
                     self.arriving.extend(arriving().map(|track| track.replacing(id)));
                 }
                 Some(_) => {}
-                None if found.detection.is_accepted() => self.arriving.extend(arriving()),
+                None if found.detection.is_accepted() && num_free > 0 => {
+                    num_free -= 1;
+                    self.arriving.extend(arriving());
+                }
                 None => {}
             }
         }
@@ -387,7 +395,7 @@ impl Tracker {
             })
             .collect();
         let asked: Vec<Clues> = clues.iter().flatten().copied().collect();
-        let mut judged = detector.model().judge_in_sequence(&asked, self.log_size()).into_iter();
+        let mut judged = detector.model().judge_in_sequence(&asked, &self.log_sizes()).into_iter();
         let mut verdicts = clues.iter().map(|clues| clues.as_ref().and_then(|_| judged.next())).collect::<Vec<_>>();
         let of_newcomers = verdicts.split_off(self.tracks.len());
 

@@ -7,7 +7,7 @@ use super::vision::Detection2DArray;
 structure! {
     /// `sdg_interfaces/srv/Detect_Request`.
     DetectRequest {
-        /// Minimum score of the returned detections; a value below the node's setting, such as 0, has no effect.
+        /// Minimum score of the returned detections; it may be below the node's setting. 0 is the node's setting.
         min_score: f64,
         /// Maximum wait for a picture that arrives after the call; 0 for 5 s.
         timeout_secs: f64,

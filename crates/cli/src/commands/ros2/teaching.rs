@@ -52,7 +52,11 @@ pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt
     options.time_budget = job.time_budget;
     let files = TeachingFiles { demonstrations: &[demonstration], negatives: &[], camera };
     let demonstrations = files.read(&mut options)?;
-    let (_, figures) = teach_to_file(&demonstrations, &options, &job.out, interrupt)?;
+    // The node may have read the file as its model.
+    let own = Some(job.out.as_path());
+    sdg_files::check_extendable(&job.out, own)?;
+    sdg_inputs::check_replaces_a_model(&job.out)?;
+    let (_, figures) = teach_to_file(&demonstrations, &options, (&job.out, own), interrupt)?;
     if let Some(failure) = figures.failure() {
         eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }

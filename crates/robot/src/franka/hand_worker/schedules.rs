@@ -39,9 +39,13 @@ const TURNS: [Turn; 5] = [Turn::Reach, Turn::Miss, Turn::Start, Turn::StopMotion
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Resting,
-    Moving { id: u32 },
+    Moving {
+        id: u32,
+    },
     /// The motion has ended, and the caller has not asked for its result.
-    Ended { is_reached: bool },
+    Ended {
+        is_reached: bool,
+    },
 }
 
 /// The other end of the connection: responses are written by the test.
