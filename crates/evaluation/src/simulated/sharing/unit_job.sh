@@ -8,7 +8,7 @@ if [ ! -e "$folder/slurm/@MARKER@" ]; then
     echo "sdg: $folder: expected the folder that was submitted on @HOST@, found another one on $(uname -n): is it shared?" >&2
     exit 1
 fi
-unit=$(sed -n "$((SLURM_ARRAY_TASK_ID + before + 1))p" "$folder/slurm/$list.units")
+unit=$(sed -n "$((SLURM_ARRAY_TASK_ID + before + 1))p" "$folder/slurm/@MARKER@-$list.units")
 @COMMAND@ --out "$folder" --unit "$unit" && exit 0
 status=$?
 # A unit that failed for the first time is tried once more, on another node if there is one. The task is requeued, so that arrays
