@@ -93,6 +93,8 @@ const SECTIONS: [&str; 10] = [
     "table",
     "hand_eye",
 ];
+/// The sections that another program computed from the intrinsics, and for a stereo camera from the other camera.
+const OF_RECTIFICATION: [&str; 2] = ["rectification_matrix", "projection_matrix"];
 /// Largest distance of a camera from the flange, in metres.
 const MAX_ON_HAND_M: f64 = 2.0;
 
@@ -185,12 +187,17 @@ impl CalibratedCamera {
         self.sections().into_iter().map(|(_, section)| section).collect()
     }
 
-    /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept.
+    /// Returns the text of an existing file with this camera's values. Data of other programs and comments are kept,
+    /// and with equal intrinsics also the matrices of rectification and projection.
     ///
     /// # Errors
     /// [`CameraFileError::NotUpdatable`] if the file does not have ROS's layout.
     pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
-        let updated = merged(existing, &SECTIONS, &self.sections());
+        let is_recalibrated = !Self::from_yaml(existing).is_ok_and(|old| old.intrinsics == self.intrinsics);
+        let is_ours = |name: &str| is_recalibrated || !OF_RECTIFICATION.contains(&name);
+        let known: Vec<&str> = SECTIONS.into_iter().filter(|&name| is_ours(name)).collect();
+        let sections: Vec<_> = self.sections().into_iter().filter(|&(name, _)| is_ours(name)).collect();
+        let updated = merged(existing, &known, &sections);
         match Self::from_yaml(&updated) {
             Ok(read) if read.is_near(self) => Ok(updated),
             _ => Err(CameraFileError::NotUpdatable),
@@ -497,6 +504,17 @@ table:
         assert!(updated.starts_with("# bought 2019\n") && updated.contains("serial_number: 17  # on the back\n"));
         assert_eq!(read(&updated).unwrap(), camera);
         assert_eq!(camera.update_yaml("{a: 1}"), Err(CameraFileError::NotUpdatable));
+    }
+
+    #[test]
+    fn a_new_pose_keeps_the_projection_and_a_new_calibration_replaces_it() {
+        let posed = read(&format!("{OF_ROS}{TABLE}")).unwrap();
+        let updated = posed.update_yaml(OF_ROS).unwrap();
+        assert!(updated.starts_with(OF_ROS.split("camera_name").next().unwrap()) && updated.contains("393.653800"));
+        assert_eq!(read(&updated).unwrap(), posed);
+        let mut recalibrated = posed;
+        recalibrated.intrinsics.fx = 500.0;
+        assert!(!recalibrated.update_yaml(OF_ROS).unwrap().contains("393.653800"));
     }
 
     #[test]

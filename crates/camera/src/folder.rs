@@ -137,6 +137,10 @@ impl Source for Folder {
     fn is_on_request(&self) -> bool {
         true
     }
+
+    fn has_connection(&self) -> bool {
+        false
+    }
 }
 
 /// The sorted names of the pictures in a folder, without hidden files: programs often write a file under a hidden name

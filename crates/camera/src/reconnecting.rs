@@ -16,7 +16,8 @@ const MAX_PAUSE: Duration = Duration::from_secs(5);
 /// Number of stall timeouts in a row after which the connection is dropped: the other end may have disappeared without
 /// closing the connection.
 const MAX_STALLS: u32 = 3;
-/// Number of torn frames in a row after which the connection is dropped: the frame boundaries may be lost.
+/// Number of torn frames in a row after which the connection is dropped: the frame boundaries may be lost. Files are
+/// then read after a pause.
 const MAX_TORN: u32 = 30;
 
 /// Opens a connection; the deadline applies only to HTTP.
@@ -66,8 +67,9 @@ impl Reconnecting {
 
     /// Drops the connection and schedules the next attempt.
     fn lose(&mut self, why: String) -> CameraError {
-        // A device or a process must be closed before it is reopened.
-        self.source = None;
+        // A device or a process must be closed before it is reopened. A folder is kept, because it knows which files
+        // were read.
+        self.source.take_if(|source| source.has_connection());
         (self.num_stalls, self.num_torn) = (0, 0);
         let now = Instant::now();
         let since = self.lost.take().map_or(now, |lost| lost.since);
@@ -76,16 +78,17 @@ impl Reconnecting {
         fault(&self.name, Fault::Gone { why })
     }
 
-    /// Waits for the end of the pause and reopens the camera; fails if the pause ends after the deadline.
-    fn reopen(&mut self, deadline: Instant) -> Result<(), CameraError> {
-        let (retry_at, why) = match &self.lost {
-            Some(lost) => (lost.retry_at, lost.why.clone()),
-            None => (Instant::now(), String::new()),
-        };
-        sleep(retry_at.min(deadline).saturating_duration_since(Instant::now()));
-        if retry_at > deadline {
-            return Err(fault(&self.name, Fault::Gone { why }));
+    /// Waits for the end of the pause after a loss; fails if the pause ends after the deadline.
+    fn wait_for_retry(&self, deadline: Instant) -> Result<(), CameraError> {
+        let Some(Lost { why, retry_at, .. }) = &self.lost else { return Ok(()) };
+        sleep((*retry_at).min(deadline).saturating_duration_since(Instant::now()));
+        if *retry_at > deadline {
+            return Err(fault(&self.name, Fault::Gone { why: why.clone() }));
         }
+        Ok(())
+    }
+
+    fn reopen(&mut self, deadline: Instant) -> Result<(), CameraError> {
         match (self.opener)(deadline) {
             Ok(source) => {
                 self.source = Some(source);
@@ -105,12 +108,14 @@ fn without_address(error: &CameraError, name: &str) -> String {
 impl Camera for Reconnecting {
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
         let deadline = Instant::now() + self.stall_timeout;
+        self.wait_for_retry(deadline)?;
         let source = loop {
             match &mut self.source {
                 Some(source) => break source,
                 None => self.reopen(deadline)?,
             }
         };
+        let has_connection = source.has_connection();
         match source.take(deadline) {
             Ok(Some(taken)) => {
                 self.next_number += taken.num_skipped + 1;
@@ -129,7 +134,7 @@ impl Camera for Reconnecting {
             Err(Missing::Late) => {
                 self.num_stalls += 1;
                 let silent_secs = self.last_frame.elapsed().as_secs_f64();
-                if self.num_stalls >= MAX_STALLS {
+                if has_connection && self.num_stalls >= MAX_STALLS {
                     return Err(self.lose(format!("no frame for {silent_secs:.1} s, so the camera is reopened")));
                 }
                 Err(fault(&self.name, Fault::Stale { silent_secs }))
@@ -138,7 +143,12 @@ impl Camera for Reconnecting {
                 self.num_torn += 1;
                 self.next_number += 1;
                 if self.num_torn >= MAX_TORN {
-                    return Err(self.lose(format!("{MAX_TORN} torn pictures in a row, the last: {found}")));
+                    if has_connection {
+                        return Err(self.lose(format!("{MAX_TORN} torn pictures in a row, the last: {found}")));
+                    }
+                    // Without a pause, a looped folder whose files are all broken would occupy a core.
+                    self.num_torn = 0;
+                    sleep(FIRST_PAUSE.min(self.stall_timeout));
                 }
                 Err(fault(&self.name, Fault::Torn { found }))
             }

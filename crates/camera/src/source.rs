@@ -45,6 +45,11 @@ pub(crate) trait Source: Send {
     fn is_on_request(&self) -> bool {
         false
     }
+
+    /// Whether there is a connection that can be lost. Files have none: a new source would begin again with the first.
+    fn has_connection(&self) -> bool {
+        true
+    }
 }
 
 /// A [`CameraError::Fault`] of this camera.

@@ -168,7 +168,12 @@ impl Cell {
         }
         if let Some(Asked::Goal(goal)) = self.grippers.asked(|goal| goal.position.is_finite())? {
             let command = match goal.max_effort > 0.0 {
-                true => HandCommand::Grasp { width_m: 0.04, speed_m_s: 0.05, force_n: goal.max_effort },
+                true => HandCommand::Grasp {
+                    width_m: 0.04,
+                    tolerance_m: [0.04; 2],
+                    speed_m_s: 0.05,
+                    force_n: goal.max_effort,
+                },
                 false => HandCommand::Move { opening_m: 2.0 * goal.position, speed_m_s: 0.1 },
             };
             self.workcell.start_hand(command)?;

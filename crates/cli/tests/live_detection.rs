@@ -255,6 +255,10 @@ fn what_cannot_be_is_refused() {
     };
     refused(&["--from", "ftp://camera"], 2, "ftp://camera");
     refused(&["--from", "dir:/nowhere"], 1, "/nowhere");
+    let broken = path(&folder, "broken.png");
+    fs::write(&broken, "not a picture").unwrap();
+    refused(&["--from", &format!("file:{broken}")], 1, "1 of 1 pictures could not be used");
+    refused(&["--from", &format!("dir:{}", folder.path().display())], 1, "1 of 1 pictures could not be used");
     refused(&["--from", "sim:teapot"], 1, "teapot");
     refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "port of 127.0.0.1");
     refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "found \"pictures\"");

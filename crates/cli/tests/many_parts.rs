@@ -58,6 +58,12 @@ fn parts_that_look_alike_are_told() {
     assert!(text.contains("look alike: lever and twin"), "{text}");
     assert!(teach(&["--part", "twin", "--seed", "2"]).status.success());
     assert_ne!(record("twin"), twin);
+    // Random initialisation is another input than the included weights.
+    let output = teach(&["--part", "lever", "--base-weights", "none"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let without_weights = record("lever");
+    assert!(teach(&["--part", "lever"]).status.success());
+    assert_ne!(record("lever"), without_weights);
 }
 
 #[test]

@@ -59,11 +59,14 @@ impl CameraUpdate {
     /// Writes the file. Without a `name`, the existing name is kept.
     ///
     /// # Errors
-    /// The existing file cannot be updated, or the file cannot be written.
+    /// A camera file with these intrinsics could not be read, the existing file cannot be updated, or the file cannot
+    /// be written.
     pub fn write(self, intrinsics: PinholeCamera, name: Option<String>) -> Result<()> {
         let Self { path, existing, old } = self;
         let name = name.or(old.map(|old| old.name)).unwrap_or_else(|| DEFAULT_NAME.to_owned());
         let camera = without_pose(name, intrinsics);
+        // A fitted lens may fold the picture, and then every command refuses the file.
+        CalibratedCamera::from_yaml(&camera.to_yaml()).with_context(|| path.display().to_string())?;
         let text = if existing.trim().is_empty() {
             camera.to_yaml()
         } else {
@@ -75,4 +78,26 @@ impl CameraUpdate {
 
 fn without_pose(name: String, intrinsics: PinholeCamera) -> CalibratedCamera {
     CalibratedCamera { name, intrinsics, table: None, flange_from_camera: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::PlumbBob;
+
+    #[test]
+    fn a_lens_that_folds_the_picture_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("camera.yaml");
+        let good = PinholeCamera::symmetric(640, 480, 400.0);
+        let folding = PinholeCamera { lens: PlumbBob { k1: -1.5, ..PlumbBob::NONE }, ..good };
+        let refusal = || format!("{:#}", CameraUpdate::read(&path).unwrap().write(folding, None).unwrap_err());
+        let error = refusal();
+        assert!(error.contains("fold the picture") && !path.exists(), "{error}");
+        let text = without_pose("wrist".to_owned(), good).to_yaml();
+        fs::write(&path, &text).unwrap();
+        let error = refusal();
+        assert!(error.contains("fold the picture"), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
+    }
 }

@@ -1,5 +1,7 @@
 //! States of an arm and its hand, and commands to them, as plain values.
 
+use std::ops::RangeInclusive;
+
 use sdg_kinematics::JointVector;
 
 /// Time between two commands of an arm that gets a command in every cycle (1 kHz), s.
@@ -76,9 +78,10 @@ pub enum HandCommand {
     },
     /// Close until the fingers meet resistance.
     Grasp {
-        /// The part's width between the fingers, m. A final width that differs by more than [`GRASP_TOLERANCE_M`] is
-        /// not a grasp.
+        /// The part's width between the fingers, m. Only the final widths [`held_widths_m`] are a grasp.
         width_m: f64,
+        /// Tolerances below (first) and above (second) that width, m.
+        tolerance_m: [f64; 2],
         /// Speed at which the opening changes, m/s.
         speed_m_s: f64,
         /// Force of each finger, N.
@@ -86,12 +89,17 @@ pub enum HandCommand {
     },
 }
 
-/// Tolerances below (first) and above (second) the commanded width of a part, m. The tolerances are wide because a
-/// width measured in a picture is accurate to a few millimetres only, and a round part may be gripped beside its
-/// thickest point. [`MIN_HELD_WIDTH_M`] detects a hand that closed without a part.
+/// Tolerances below (first) and above (second) a part's width in a picture, m. The tolerances are wide because a width
+/// measured in a picture is accurate to a few millimetres only, and a round part may be gripped beside its thickest
+/// point. [`MIN_HELD_WIDTH_M`] detects a hand that closed without a part.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
+
+/// The final widths, m, at which a hand holds a part, for the width and the tolerances of [`HandCommand::Grasp`].
+pub fn held_widths_m(width_m: f64, [thinner_m, wider_m]: [f64; 2]) -> RangeInclusive<f64> {
+    (width_m - thinner_m).max(MIN_HELD_WIDTH_M)..=width_m + wider_m
+}
 
 /// The load of the hand, for the controller's gravity compensation.
 #[derive(Debug, Clone, Copy, PartialEq)]

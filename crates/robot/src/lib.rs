@@ -58,7 +58,7 @@ pub mod workcell;
 pub use arm::{Arm, CompliantArm};
 pub use arm_state::{
     ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
-    MotionEnd, PERIOD_SECS,
+    MotionEnd, PERIOD_SECS, held_widths_m,
 };
 pub use camera_pose::CameraPose;
 pub use error::{Result, RobotError};

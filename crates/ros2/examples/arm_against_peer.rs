@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use sdg_kinematics::{JointLimits, Trajectory, ready_pose};
-use sdg_robot::{Arm, HandCommand, Robot, RobotError, SafetyLimits, StopReason, Watch};
+use sdg_robot::{Arm, GRASP_TOLERANCE_M, HandCommand, Robot, RobotError, SafetyLimits, StopReason, Watch};
 use sdg_ros2::Naming;
 use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, Rmw, TrajectoryArm};
 
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("fourth: {}", told(&follow(&mut arm, 0.4, Watch::new(Box::new(stop)))));
     for (name, command) in [
         ("open", HandCommand::Move { opening_m: 0.08, speed_m_s: 0.1 }),
-        ("grasp", HandCommand::Grasp { width_m: 0.03, speed_m_s: 0.1, force_n: 40.0 }),
+        ("grasp", HandCommand::Grasp { width_m: 0.03, tolerance_m: GRASP_TOLERANCE_M, speed_m_s: 0.1, force_n: 40.0 }),
     ] {
         arm.start_hand(command)?;
         let hand = arm.finish_hand(&mut Watch::default())?;

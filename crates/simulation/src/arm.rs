@@ -2,8 +2,8 @@
 
 use sdg_kinematics::ArmGeometry;
 use sdg_robot::{
-    Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load,
-    MIN_HELD_WIDTH_M, MotionEnd, PERIOD_SECS, Playback, RobotError, StopReason, Watch,
+    Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS,
+    Playback, RobotError, StopReason, Watch, held_widths_m,
 };
 
 use crate::attempt_errors::{ArmFault, ArmFaultKind};
@@ -134,10 +134,9 @@ impl Arm for Workcell {
     fn hand(&mut self) -> Result<HandState> {
         let (opening_m, force_n) = (self.opening_m(), self.hand_force_n());
         let is_grasping = match self.hand_command {
-            Some(HandCommand::Grasp { width_m, force_n: told_n, .. }) => {
-                let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
-                let widths_m = (width_m - thinner_m).max(MIN_HELD_WIDTH_M)..=width_m + wider_m;
-                widths_m.contains(&opening_m) && force_n >= PRESSING_SHARE * told_n.min(crate::MAX_FINGER_FORCE_N)
+            Some(HandCommand::Grasp { width_m, tolerance_m, force_n: told_n, .. }) => {
+                held_widths_m(width_m, tolerance_m).contains(&opening_m)
+                    && force_n >= PRESSING_SHARE * told_n.min(crate::MAX_FINGER_FORCE_N)
             }
             Some(HandCommand::Move { .. }) | None => false,
         };

@@ -123,7 +123,7 @@ pub(super) fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
 const SHIPPED_FILE: &str = "crates/grasp/weights/edge.safetensors";
 
 /// Value of `--base-weights` for random initialisation.
-const NO_BASE_WEIGHTS: &str = "none";
+pub(super) const NO_BASE_WEIGHTS: &str = "none";
 
 /// Maximum number of photos named in the line of an error.
 const MAX_NAMED: usize = 3;

@@ -11,7 +11,7 @@ use sdg_evaluation::many_parts::{
 use sdg_weights_conversion::sha256_of;
 use serde_json::{Value, json};
 
-use super::teach::{TeachArgs, options, read_base_weights, symmetry};
+use super::teach::{NO_BASE_WEIGHTS, TeachArgs, options, read_base_weights, symmetry};
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::progress::EvaluationProgress;
@@ -21,7 +21,11 @@ use crate::progress::EvaluationProgress;
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
     let mut options = options(args)?;
     read_base_weights(args, &mut options)?;
-    let weights_sha256 = args.base_weights.as_deref().map(sha256_of).transpose()?;
+    let weights_sha256 = match &args.base_weights {
+        // Not `None`, which stands for the included weights: finished parts of one are not parts of the other.
+        Some(path) if path.as_os_str() == NO_BASE_WEIGHTS => Some(NO_BASE_WEIGHTS.to_owned()),
+        path => path.as_deref().map(sha256_of).transpose()?,
+    };
     let demonstrations = DemonstrationFolder::read(folder, symmetry)?;
     let asked = asked_for(args, &demonstrations.parts)?;
     let store = PartStore::open(&args.out)?;

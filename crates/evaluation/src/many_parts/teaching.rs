@@ -22,7 +22,8 @@ pub struct PartTeaching<'a> {
     pub store: &'a PartStore,
     /// The options, with the initial weights.
     pub options: &'a TeachOptions,
-    /// The SHA-256 of the file of the initial weights, if a file is given.
+    /// The SHA-256 of the file of the initial weights, or another name of the initialisation; `None` for the included
+    /// weights.
     pub weights_sha256: Option<&'a str>,
     /// Prefixes of the parameters that are initialised randomly in spite of that file.
     pub reinitialized: &'a [String],

@@ -4,7 +4,7 @@ use std::thread::JoinHandle;
 
 use sdg_fci::client::{Hand, HandStopHandle};
 
-use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH_M};
+use crate::arm_state::{HandCommand, HandState, held_widths_m};
 use crate::error::{Result, RobotError};
 use crate::robot_address::RobotAddress;
 
@@ -84,9 +84,9 @@ fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
             true => Ok(()),
             false => Err(RobotError::Hand(format!("it did not reach {:.0} mm", opening_m * 1e3))),
         },
-        HandCommand::Grasp { width_m, speed_m_s, force_n } => {
-            let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
-            let thinner_m = thinner_m.min(width_m - MIN_HELD_WIDTH_M).max(0.0);
+        HandCommand::Grasp { width_m, tolerance_m, speed_m_s, force_n } => {
+            let held_m = held_widths_m(width_m, tolerance_m);
+            let (thinner_m, wider_m) = ((width_m - held_m.start()).max(0.0), held_m.end() - width_m);
             // Closing without a part is not a failure of the hand; its width shows that it holds nothing.
             hand.grasp(width_m, speed_m_s, force_n, thinner_m, wider_m).map(drop).map_err(failed)
         }

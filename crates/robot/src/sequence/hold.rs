@@ -9,7 +9,7 @@ use super::held_part::HeldPart;
 use super::reach::above;
 use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
-use crate::arm_state::{HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
+use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
@@ -29,6 +29,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.begin(GraspStep::Close)?;
         self.robot.start_hand(HandCommand::Grasp {
             width_m: target.jaw_width_m,
+            tolerance_m: GRASP_TOLERANCE_M,
             speed_m_s: CLOSING_SPEED_M_S,
             force_n: self.cell.config.grasp_force_n,
         })?;

@@ -69,13 +69,14 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let corners: Vec<Vec<SeenCorner>> = seen.iter().map(|seen| seen.corners.clone()).collect();
     let found = calibrate(&board, &corners, &config(size))?;
     let update = CameraUpdate::read(&args.out)?;
-    if update.removes_pose() {
+    let removes_pose = update.removes_pose();
+    update.write(found.camera, args.camera_name.clone())?;
+    if removes_pose {
         eprintln!(
             "{}: the camera's pose was measured with the old calibration and is removed: run table or hand-eye again",
             args.out.display()
         );
     }
-    update.write(found.camera, args.camera_name.clone())?;
     for (seen, fit) in seen.iter().zip(&found.pictures) {
         lines.push(json!({
             "picture": named(&seen.path), "corners": seen.corners.len(), "rms_px": fit.rms_px, "left_out": fit.is_left_out,

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 use image::RgbImage;
-use sdg_camera::{Address, Frame, MjpegServer};
+use sdg_camera::{Address, Fault, Frame, MjpegServer};
 use sdg_cell::{
     DetectionWords, FrameDetector, FrameRecord, FrameSize, FrameSizes, Frames, Next, Part, Perception, drawing,
     track_state_name,
@@ -59,6 +59,8 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
             Next::None => continue,
             Next::End => break,
             Next::Error(error) if error.is_passing() => {
+                // A torn frame of a stream is replaced by the next one, a broken file is a picture that cannot be used.
+                num_failed += u64::from(!address.is_live() && matches!(error.fault(), Some(Fault::Torn { .. })));
                 write_error(&mut stdout, args, address, &error.into())?;
                 continue;
             }

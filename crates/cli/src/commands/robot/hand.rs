@@ -14,8 +14,11 @@ use crate::robots::{self, write_states};
 
 /// Speed of the fingers relative to each other, in m/s.
 const SPEED_M_S: f64 = 0.05;
-/// Target width for closing on an object of unknown width. Any final width counts as grasped.
+/// Target width for closing on an object of unknown width.
 const ANY_WIDTH_M: f64 = 0.5 * HAND_OPENING_MAX_M;
+/// Tolerances below and above that width. Any final width up to the largest opening counts as grasped, except for that
+/// of an empty hand.
+const ANY_TOLERANCE_M: [f64; 2] = [ANY_WIDTH_M; 2];
 /// Maximum continuous grasping force of the hand, in N.
 const MAX_FORCE_N: f64 = 70.0;
 
@@ -64,7 +67,12 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
         return Err(Usage(format!("--force-n: expected 1 to {MAX_FORCE_N}, found {}", args.force_n)).into());
     }
     let (mut arm, _) = args.arm.connect()?;
-    let close = HandCommand::Grasp { width_m: ANY_WIDTH_M, speed_m_s: SPEED_M_S, force_n: args.force_n };
+    let close = HandCommand::Grasp {
+        width_m: ANY_WIDTH_M,
+        tolerance_m: ANY_TOLERANCE_M,
+        speed_m_s: SPEED_M_S,
+        force_n: args.force_n,
+    };
     let hand = command(&mut arm, close, &args.states)?;
     let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
     eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
@@ -80,4 +88,16 @@ fn command(arm: &mut FrankaArm, command: HandCommand, states: &Path) -> Result<H
         write_states(states, &watch)?;
     }
     Ok(finished?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_robot::held_widths_m;
+
+    #[test]
+    fn closing_holds_thin_and_wide_objects() {
+        let widths_m = held_widths_m(ANY_WIDTH_M, ANY_TOLERANCE_M);
+        assert_eq!([0.0005, 0.002, 0.078].map(|width_m| widths_m.contains(&width_m)), [false, true, true]);
+    }
 }

@@ -31,13 +31,18 @@ pub struct SlurmJob<'a> {
 
 /// The script that submits the units.
 pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
+    script_of_submission(job, units, &format!("submitted-{}-{}", unix_secs(), std::process::id()))
+}
+
+/// The script of the submission with this name. The lists of its units have this name too, because waiting tasks of
+/// other submissions still read theirs.
+fn script_of_submission(job: &SlurmJob, units: &[ListedUnit], marker: &str) -> String {
     let folder = quoted(&job.folder.display().to_string());
     let host = Worker::this().host;
-    let marker = format!("submitted-{}-{}", unix_secs(), std::process::id());
     let command: Vec<String> = job.command.iter().map(|word| quoted(word)).collect();
     let unit_job = UNIT_JOB
         .replace("@FOLDER@", &folder)
-        .replace("@MARKER@", &marker)
+        .replace("@MARKER@", marker)
         .replace("@HOST@", &host)
         .replace("@COMMAND@", &command.join(" "));
     let mut script = format!(
@@ -72,7 +77,7 @@ pub fn submit_script(job: &SlurmJob, units: &[ListedUnit]) -> String {
         if names.is_empty() {
             continue;
         }
-        line(format_args!("cat >\"$folder/slurm/{list}.units\" <<'UNITS'\n{}\nUNITS\n", names.join("\n")));
+        line(format_args!("cat >\"$folder/slurm/{marker}-{list}.units\" <<'UNITS'\n{}\nUNITS\n", names.join("\n")));
         let waits = match before.is_empty() {
             true => String::new(),
             false => format!(" --dependency=\"afterany:{}\"", before.join(":")),
@@ -127,9 +132,11 @@ mod tests {
             limit_mins: 40,
             sbatch: &["--partition=cpu".to_owned()],
         };
-        let script = submit_script(&job, &units);
+        let script = script_of_submission(&job, &units, "submitted-1");
         for expected in [
             "--requeue",
+            "cat >\"$folder/slurm/submitted-1-teach.units\" <<'UNITS'\n",
+            "p\" \"$folder/slurm/submitted-1-$list.units\")",
             "--cpus-per-task=2 --mem=1500M --time=40 --partition=cpu",
             "teach_0=$(submit --job-name=sdg-teach --array=0-3 \"$folder",
             "try_0=$(submit --job-name=sdg-try --array=0-5 --dependency=\"afterany:${teach_0}\" ",
@@ -140,6 +147,13 @@ mod tests {
             assert!(script.contains(expected), "{expected}\n{script}");
         }
         assert!(!script.contains('@') || !script.contains("@FOLDER@"), "{script}");
+        // A later submission of other units leaves these lists as they are.
+        let later = script_of_submission(&job, &units[1..], "submitted-2");
+        let lists = |script: &str| -> Vec<String> {
+            script.lines().filter(|line| line.ends_with(".units\" <<'UNITS'")).map(str::to_owned).collect()
+        };
+        assert_eq!((lists(&script).len(), lists(&later).len()), (3, 3));
+        assert!(lists(&later).iter().all(|list| !lists(&script).contains(list)), "{later}");
     }
 
     #[test]

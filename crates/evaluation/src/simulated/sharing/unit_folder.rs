@@ -17,6 +17,8 @@ const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// Interval between attempts to take a lock that another process holds.
 const LOCK_WAIT: Duration = Duration::from_millis(500);
 const RUNNING: &str = "running.json";
+/// The failure of a process that left no record of an end, as when it was killed.
+pub(super) const ABANDONED: &str = "its process ended without a result";
 
 /// The folder with the records of a unit.
 #[derive(Debug)]
@@ -45,18 +47,30 @@ impl UnitFolder {
         Self(evaluation.join("units").join(unit))
     }
 
-    /// Takes the unit for this process, after the process that holds it, if any, has ended. `wait` is called
-    /// repeatedly, and may return `false` to stop waiting; the result is then `None`. A file system without locks
-    /// grants every request: duplicates are then detected by two receipts.
+    /// Takes the unit for this process, after the process that holds it, if any, has ended. If that process, or an
+    /// earlier one, left no record of an end, its failure is recorded. `wait` is called repeatedly, and may return
+    /// `false` to stop waiting; the result is then `None`. A file system without locks grants every request: duplicates
+    /// are then detected by two receipts.
     ///
     /// # Errors
-    /// The folder cannot be written.
+    /// The folder cannot be written, or records cannot be read or are damaged.
     pub(super) fn hold(&self, wait: &mut dyn FnMut() -> bool) -> Result<Option<Held>> {
         fs::create_dir_all(&self.0).with_context(|| format!("{}: cannot make this folder", self.0.display()))?;
+        // A lock that was free or refused shows that the file system has locks: without them, the process of the record
+        // may still run.
+        let mut has_locks = self.read()?.is_abandoned;
         loop {
             match Lock::take(&self.lock_file(), Access::Alone)? {
-                Some(lock) => return Ok(Some(Held(lock))),
-                None if wait() => std::thread::sleep(LOCK_WAIT),
+                Some(lock) => {
+                    if has_locks {
+                        self.record_abandoned()?;
+                    }
+                    return Ok(Some(Held(lock)));
+                }
+                None if wait() => {
+                    has_locks = true;
+                    std::thread::sleep(LOCK_WAIT);
+                }
                 None => return Ok(None),
             }
         }
@@ -105,6 +119,19 @@ impl UnitFolder {
     pub(super) fn fail(&self, failure: &Failure) -> Result<()> {
         self.write(&format!("failed-{}.json", failure.by.file_name_part(failure.started_secs)), failure)?;
         self.end()
+    }
+
+    /// Records the failure of the process that began the unit and has neither finished nor ended it.
+    fn record_abandoned(&self) -> Result<()> {
+        let UnitState { receipts, running: Some(Running { by, started_secs }), .. } = self.read()? else {
+            return Ok(());
+        };
+        if !receipts.is_empty() {
+            return Ok(());
+        }
+        let unit = self.0.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // The time of its end is not known.
+        self.fail(&Failure { unit, by, started_secs, seconds: 0.0, why: ABANDONED.to_owned() })
     }
 
     /// Removes the record of [`Self::begin`].

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-use super::unit_folder::UnitFolder;
+use super::unit_folder::{ABANDONED, UnitFolder};
 use super::unit_list::{SavedUnit, UnitKind, UnitList};
 use super::worker::{Worker, unix_secs};
 
@@ -100,8 +100,7 @@ impl Watch {
                     running.push(RunningUnit { unit: name, by: now.by, seconds });
                 }
                 (None, Some(last), _) => {
-                    let why = "its process ended without a result".to_owned();
-                    failed.push(FailedUnit { unit: name, by: last.by, why, tries });
+                    failed.push(FailedUnit { unit: name, by: last.by, why: ABANDONED.to_owned(), tries });
                 }
                 (None, None, Some(failure)) => {
                     let (by, why) = (failure.by.clone(), failure.why.clone());
@@ -197,5 +196,26 @@ fn duration(seconds: f64) -> String {
         0..60 => format!("{seconds} s"),
         60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),
         _ => format!("{} h {} min", seconds / 3600, seconds / 60 % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_whose_process_was_killed_twice_is_settled() {
+        let folder = tempfile::tempdir().unwrap();
+        let saved = SavedUnit { name: "look-pendulum".to_owned(), after: Vec::new() };
+        UnitList { units: vec![saved] }.save(folder.path()).unwrap();
+        let unit = UnitFolder::of(folder.path(), "look-pendulum");
+        for tries in 1..=MAX_TRIES {
+            let held = unit.hold(&mut || false).unwrap();
+            unit.begin(&Worker::this()).unwrap();
+            // The process ends without a record.
+            drop(held);
+            let progress = Watch::new(folder.path()).unwrap().progress().unwrap();
+            assert_eq!((progress.failed[0].tries, progress.is_settled), (tries, tries == MAX_TRIES));
+        }
     }
 }
