@@ -122,6 +122,8 @@ export async function takePhoto() {
     // The button disappears with the live picture.
     by("overlay").focus({ preventScroll: true });
     toast(`Photo taken: ${view.name}`);
+    // The first photo determines the project.
+    state.project ??= (await api.session()).project;
   } catch (error) {
     toast(error.message);
   }

@@ -62,9 +62,11 @@ impl ProjectPlace {
         Ok(Self { folder, file: photo.with_extension(FILE), is_folder: false })
     }
 
-    /// The project's path for display and comparison: the folder, or the file of a photo's project.
+    /// The project's absolute path for display and comparison: the folder, or the file of a photo's project.
     pub fn shown(&self) -> String {
-        if self.is_folder { self.folder.display().to_string() } else { self.file.display().to_string() }
+        let path = absolute(if self.is_folder { &self.folder } else { &self.file });
+        // A folder is the same with a slash at its end.
+        path.components().collect::<PathBuf>().display().to_string()
     }
 }
 
@@ -366,6 +368,17 @@ mod tests {
         let place = ProjectPlace::of_photo(&at("b.png")).unwrap();
         assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(FILE), whole));
         assert_eq!(ProjectPlace::of_photo(&at("a.png")).unwrap().file, at("a.sdg-project.json"));
+    }
+
+    #[test]
+    fn a_project_is_compared_by_its_absolute_path() {
+        let here = std::env::current_dir().unwrap();
+        let photo = ProjectPlace::of_photo(Path::new("photo.png")).unwrap();
+        assert_eq!(photo.shown(), here.join("photo.sdg-project.json").display().to_string());
+        for folder in ["rod", "rod/", "./rod"] {
+            let place = ProjectPlace::of_folder(Path::new(folder));
+            assert_eq!(place.shown(), here.join("rod").display().to_string(), "{folder}");
+        }
     }
 
     #[test]
