@@ -18,6 +18,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use sdg_demonstration::PixelFrame;
 use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
@@ -88,7 +89,7 @@ pub fn label_of(opened: &Path) -> Option<String> {
     // Without a name in the project's file, the photo's marks give it.
     let first = file.and_then(|file| file.photos.first().map(|name| place.folder.join(name)));
     let photo = if place.is_folder { first? } else { opened.to_owned() };
-    let size = Picture::open(&photo).ok()?.size;
+    let size = Picture::open(&photo, PixelFrame::Upright).ok()?.size;
     annotation_file::open(&photo, None, size).ok()?.label
 }
 
@@ -151,9 +152,9 @@ pub struct Gone {
 
 impl Gone {
     /// Opens a picture. If it cannot be read, a note says why it is left out.
-    pub fn open(&mut self, path: &Path) -> Option<Picture> {
+    pub fn open(&mut self, path: &Path, frame: PixelFrame) -> Option<Picture> {
         let unreadable = |error| self.notes.push(format!("{error}; this picture is left out."));
-        Picture::open(path).map_err(unreadable).ok()
+        Picture::open(path, frame).map_err(unreadable).ok()
     }
 }
 
@@ -246,7 +247,8 @@ impl ProjectFile {
             if is_known {
                 continue;
             }
-            let Some(picture) = gone.open(&path) else { continue };
+            // The frame matters only for rotated pictures, which a session with a calibrated camera refuses as photos.
+            let Some(picture) = gone.open(&path, PixelFrame::Upright) else { continue };
             let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
             if is_marked {
                 self.photos.push(name);

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use sdg_demonstration::{Annotation, Demonstration, ImageFacts, PixelFrame};
 use serde_json::Value;
 
 use crate::advice::advise;
@@ -229,16 +229,18 @@ impl MarkedPicture {
     /// A picture with the marks in the file beside it, and the object's name in that file.
     ///
     /// # Errors
-    /// The picture cannot be read, or the marks belong to another picture.
-    pub fn open(path: &Path, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
-        Self::of(Picture::open(path)?, annotation)
+    /// The picture cannot be read, or the errors of [`of`](Self::of).
+    pub fn open(path: &Path, frame: PixelFrame) -> Result<(Self, Option<String>)> {
+        Self::of(Picture::open(path, frame)?, None)
     }
 
-    /// As [`open`](Self::open), for a picture that has been read.
+    /// As [`open`](Self::open), for a picture that has been read; `annotation` is the file of the marks if it is not
+    /// named after the picture.
     ///
     /// # Errors
-    /// The marks belong to another picture.
+    /// The marks belong to another picture, or an Exif orientation rotates a photo of a calibrated camera.
     pub fn of(picture: Picture, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
+        picture.check_is_markable()?;
         let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
         // The file that was read, not the file for changes, which may not exist yet.
         let found = opened.found.filter(|_| opened.marks.has_object());
