@@ -93,9 +93,11 @@ async function pictureOf(number) {
 }
 
 async function graspsIn(number) {
+  const { generation } = state;
   try {
     const { detections, seconds } = await api.detectLive(number);
-    return { detections, seconds };
+    // Detections of another model, or in another region, are not shown for this one.
+    return { detections: generation === state.generation ? detections : null, seconds };
   } catch (error) {
     if (error.lost) throw error;
     return { detections: [], failed: error.message };
@@ -122,6 +124,8 @@ export async function takePhoto() {
     // The button disappears with the live picture.
     by("overlay").focus({ preventScroll: true });
     toast(`Photo taken: ${view.name}`);
+    // The first photo determines the project.
+    state.project ??= (await api.session()).project;
   } catch (error) {
     toast(error.message);
   }

@@ -84,6 +84,6 @@ async function open(session) {
   if (!state.images.length && !state.camera && state.others.length) openFolder("photo");
   watch();
   notice(session.notes);
-  sendKept(state.project);
+  sendKept();
   beat();
 }

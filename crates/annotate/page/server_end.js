@@ -13,7 +13,8 @@ const banner = by("lost");
 /** Intervals of checking the server: while it answers, and while it does not. */
 const BEAT_MS = 3000;
 const RETRY_MS = 1500;
-const KEPT = "kept-marks";
+/** The key of this project's waiting marks in the browser's storage. */
+const keptKey = () => `kept-marks:${state.project}`;
 
 const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
 
@@ -21,7 +22,7 @@ const isUnsaved = (target) => target.saving || target.saved.lost || target.saved
 function keep() {
   const kept = {};
   for (const target of state.images.filter(isUnsaved)) kept[target.name] = { was: target.sent, marks: target.marks };
-  if (Object.keys(kept).length) stored(KEPT, JSON.stringify({ project: state.project, kept }));
+  if (Object.keys(kept).length) stored(keptKey(), JSON.stringify(kept));
 }
 
 onLoss((lost) => {
@@ -55,8 +56,8 @@ async function meetAgain() {
     // The next check tries again.
     return;
   }
-  // The server was started without a project: waiting marks are sent when this project is opened again.
-  if (session.start) return location.reload();
+  // The server was started without this project: waiting marks are kept and sent when it is opened again.
+  if (session.start || session.project !== state.project) return location.reload();
   // Another call of this function was faster.
   if (!isLost()) return;
   const gone = [];
@@ -89,15 +90,13 @@ async function meetAgain() {
   changed();
 }
 
-/** Sends the marks that were stored when the page was closed or reloaded without a server. */
-export async function sendKept(project) {
-  const text = stored(KEPT);
-  stored(KEPT, null);
+/** Sends this project's marks that were stored when the page was closed or reloaded without a server. */
+export async function sendKept() {
+  const text = stored(keptKey());
+  stored(keptKey(), null);
   if (!text) return;
-  const { project: of, kept } = JSON.parse(text);
-  if (of !== project) return;
   const sent = [];
-  for (const [name, { was, marks }] of Object.entries(kept)) {
+  for (const [name, { was, marks }] of Object.entries(JSON.parse(text))) {
     const target = state.images.find((image) => image.name === name);
     // Marks changed elsewhere since then are not overwritten.
     if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
@@ -132,7 +131,7 @@ export async function beat() {
       keep();
       await meetAgain();
     } else {
-      if (!state.images.some(isUnsaved)) stored(KEPT, null);
+      if (!state.images.some(isUnsaved)) stored(keptKey(), null);
       state.images.filter(({ saved }) => saved.by_disk).forEach(save);
       if (!document.hidden) await api.teaching().catch(() => null);
     }

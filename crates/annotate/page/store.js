@@ -7,7 +7,7 @@ export const state = {
   /** Whether the user or existing marks gave that name; otherwise it is a proposal. */
   isNamed: true,
   modelPath: "",
-  /** The project's folder, or the file of a photo's project; other pictures of the folder; versions of the model, oldest first. */
+  /** The absolute path of the project's folder, or of the file of a photo's project (null for a camera before its first photo); other pictures of the folder; versions of the model, oldest first. */
   project: undefined,
   others: [],
   models: [],
@@ -34,6 +34,8 @@ export const state = {
   tryingLive: true,
   /** The frame on the stage, with its `detections` while the model is tried, and the camera's fault. */
   live: { number: null, url: null, size: null, detections: null, failed: null, fault: null, isUsable: false, paused: false },
+  /** Number of calls of `searchAgain`: answers to earlier requests for detections are discarded. */
+  generation: 0,
   /** Minimum score of accepted detections. */
   minScore: 0.5,
   /** Order of the pictures to try in their row: as added, by score, by state. */
@@ -81,6 +83,7 @@ export const isRunning = () => ["running", "stopping"].includes(state.teaching.s
 
 /** Discards all detections, so that the pictures are searched again; if `compares`, `before` keeps them for a comparison with another model. */
 export function searchAgain({ compares }) {
+  state.generation += 1;
   for (const target of [...state.trialPictures, state.live]) {
     Object.assign(target, { before: compares ? target.detections : null, detections: null, failed: null });
   }

@@ -103,14 +103,12 @@ async function lookAtAll() {
     const waiting = (s) => s && !s.detections && !s.failed;
     const next = waiting(trialPicture()) ? trialPicture() : state.trialPictures.find(waiting);
     if (!next || state.tab !== "try") break;
+    const { generation } = state;
     next.detecting = true;
     changed();
-    try {
-      const answer = await api.detect(next.id);
-      Object.assign(next, { detections: answer.detections, seconds: answer.seconds });
-    } catch (error) {
-      next.failed = error.message;
-    }
+    const answer = await api.detect(next.id).catch((error) => ({ failed: error.message }));
+    // After a change of the model or the region in the meantime, this picture is searched again.
+    if (generation === state.generation) Object.assign(next, answer);
     next.detecting = false;
     changed();
   }

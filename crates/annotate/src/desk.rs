@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
+use sdg_demonstration::PixelFrame;
 use serde::Serialize;
 
 use crate::error::{Error, Result, TeacherError};
@@ -23,6 +24,8 @@ pub struct Start {
     pub recent: Option<RecentProjects>,
     /// Folder for new projects.
     pub folder: PathBuf,
+    /// Orientation of the pixels of photos.
+    pub pixel_frame: PixelFrame,
     /// Opens the chosen project.
     pub open: OpenProject,
 }
@@ -114,13 +117,13 @@ impl Desk {
     /// Creates a project with this name and copies a photo into it.
     ///
     /// # Errors
-    /// The name is empty or taken, the bytes are not a picture, the folder cannot be created, or another project is
-    /// open.
+    /// The name is empty or taken, the bytes are not a picture, an Exif orientation rotates a photo of a calibrated
+    /// camera, the folder cannot be created, or another project is open.
     pub fn create(&self, name: &str, photo: &str, bytes: &[u8]) -> Result<FirstView> {
         self.take(|start| {
             let name = check_label(name)?;
             let photo = photo.rsplit(['/', '\\']).next().unwrap_or(photo);
-            Picture::check(bytes, photo)?;
+            Picture::check_photo(bytes, photo, start.pixel_frame)?;
             let folder = start.folder.join(safe_stem(name));
             std::fs::create_dir(&folder).map_err(Error::file(&folder, "cannot make a new folder of this name"))?;
             let extension = Path::new(photo).extension().unwrap_or_default().to_string_lossy().to_lowercase();

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, RgbImage};
-use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, decode_image, is_turned_by_exif};
+use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
 
 use crate::error::{Error, Result};
 use crate::names::{file_name, natural_order};
@@ -22,8 +22,10 @@ pub struct Picture {
     pub path: PathBuf,
     /// Name shown on the page.
     pub name: String,
-    /// Width and height of the upright picture, in pixels.
+    /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
+    /// Orientation of the pixels.
+    pub frame: PixelFrame,
 }
 
 impl Picture {
@@ -31,26 +33,41 @@ impl Picture {
     ///
     /// # Errors
     /// The file cannot be read or is not a picture.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, frame: PixelFrame) -> Result<Self> {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        let image = decode(&read(path)?, &path.display().to_string())?;
-        Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()] })
+        let image = decode(&read(path)?, &path.display().to_string(), frame)?;
+        Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()], frame })
     }
 
-    /// Decodes bytes once, so that invalid pictures are rejected before they are written.
+    /// Decodes a photo's bytes once, so that invalid photos are rejected before they are written.
     ///
     /// # Errors
-    /// The bytes are not a picture.
-    pub fn check(bytes: &[u8], name: &str) -> Result<()> {
-        decode(bytes, name).map(|_| ())
+    /// The bytes are not a picture, or an Exif orientation rotates a photo of a calibrated camera.
+    pub fn check_photo(bytes: &[u8], name: &str, frame: PixelFrame) -> Result<()> {
+        if frame == PixelFrame::Sensor {
+            check_is_not_turned(bytes, name)?;
+        }
+        decode(bytes, name, frame).map(|_| ())
     }
 
-    /// The pixels, upright.
+    /// Checks that the picture can be a photo with marks: if an Exif orientation rotates a picture of a calibrated
+    /// camera, it would be unknown whether the marks in its file refer to the sensor's pixels.
+    ///
+    /// # Errors
+    /// The file has become unreadable, or an Exif orientation rotates a photo of a calibrated camera.
+    pub fn check_is_markable(&self) -> Result<()> {
+        match self.frame {
+            PixelFrame::Upright => Ok(()),
+            PixelFrame::Sensor => check_is_not_turned(&read(&self.path)?, &self.path.display().to_string()),
+        }
+    }
+
+    /// The pixels, in the picture's frame.
     ///
     /// # Errors
     /// The file has become unreadable, or its picture has another size now.
     pub fn pixels(&self) -> Result<RgbImage> {
-        let image = decode(&read(&self.path)?, &self.name)?;
+        let image = decode(&read(&self.path)?, &self.name, self.frame)?;
         if [image.width(), image.height()] == self.size {
             return Ok(image);
         }
@@ -61,8 +78,8 @@ impl Picture {
         })
     }
 
-    /// Bytes for a browser, with upright pixels, and their media type: the file itself if it is an upright PNG or JPEG,
-    /// otherwise a JPEG.
+    /// Bytes for a browser, with the same pixels, and their media type: the file itself if it is a PNG or JPEG without
+    /// an Exif orientation that rotates it, otherwise a JPEG.
     ///
     /// # Errors
     /// The file has become unreadable.
@@ -75,7 +92,7 @@ impl Picture {
         };
         match media_type {
             Some(media_type) if !is_turned_by_exif(&bytes) => Ok((bytes, media_type)),
-            _ => Ok((jpeg(&decode(&bytes, &self.name)?), "image/jpeg")),
+            _ => Ok((jpeg(&decode(&bytes, &self.name, self.frame)?), "image/jpeg")),
         }
     }
 }
@@ -132,9 +149,16 @@ fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(failed())
 }
 
-fn decode(bytes: &[u8], name: &str) -> Result<RgbImage> {
-    let failed = |source: PictureError| Error::Demonstration { name: name.into(), source: source.into() };
-    decode_image(bytes, &ImageLimits::default()).map_err(failed)
+fn decode(bytes: &[u8], name: &str, frame: PixelFrame) -> Result<RgbImage> {
+    decode_image_in(bytes, &ImageLimits::default(), frame).map_err(|source| refused(name, source))
+}
+
+fn check_is_not_turned(bytes: &[u8], name: &str) -> Result<()> {
+    if is_turned_by_exif(bytes) { Err(refused(name, PictureError::TurnedByExif)) } else { Ok(()) }
+}
+
+fn refused(name: &str, source: PictureError) -> Error {
+    Error::Demonstration { name: name.into(), source: source.into() }
 }
 
 #[cfg(test)]
@@ -150,7 +174,7 @@ mod tests {
         {
             let path = folder.path().join(name);
             picture.save(&path).unwrap();
-            let (bytes, found) = Picture::open(&path).unwrap().for_browser().unwrap();
+            let (bytes, found) = Picture::open(&path, PixelFrame::Upright).unwrap().for_browser().unwrap();
             assert_eq!((found, bytes == fs::read(&path).unwrap()), (media_type, is_same), "{name}");
             let found = image::guess_format(&bytes).unwrap().to_mime_type();
             assert_eq!(found, media_type, "{name}");

@@ -18,6 +18,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use sdg_demonstration::PixelFrame;
 use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
@@ -62,9 +63,11 @@ impl ProjectPlace {
         Ok(Self { folder, file: photo.with_extension(FILE), is_folder: false })
     }
 
-    /// The project's path for display and comparison: the folder, or the file of a photo's project.
+    /// The project's absolute path for display and comparison: the folder, or the file of a photo's project.
     pub fn shown(&self) -> String {
-        if self.is_folder { self.folder.display().to_string() } else { self.file.display().to_string() }
+        let path = absolute(if self.is_folder { &self.folder } else { &self.file });
+        // A folder is the same with a slash at its end.
+        path.components().collect::<PathBuf>().display().to_string()
     }
 }
 
@@ -86,7 +89,7 @@ pub fn label_of(opened: &Path) -> Option<String> {
     // Without a name in the project's file, the photo's marks give it.
     let first = file.and_then(|file| file.photos.first().map(|name| place.folder.join(name)));
     let photo = if place.is_folder { first? } else { opened.to_owned() };
-    let size = Picture::open(&photo).ok()?.size;
+    let size = Picture::open(&photo, PixelFrame::Upright).ok()?.size;
     annotation_file::open(&photo, None, size).ok()?.label
 }
 
@@ -149,9 +152,9 @@ pub struct Gone {
 
 impl Gone {
     /// Opens a picture. If it cannot be read, a note says why it is left out.
-    pub fn open(&mut self, path: &Path) -> Option<Picture> {
+    pub fn open(&mut self, path: &Path, frame: PixelFrame) -> Option<Picture> {
         let unreadable = |error| self.notes.push(format!("{error}; this picture is left out."));
-        Picture::open(path).map_err(unreadable).ok()
+        Picture::open(path, frame).map_err(unreadable).ok()
     }
 }
 
@@ -244,7 +247,8 @@ impl ProjectFile {
             if is_known {
                 continue;
             }
-            let Some(picture) = gone.open(&path) else { continue };
+            // The frame matters only for rotated pictures, which a session with a calibrated camera refuses as photos.
+            let Some(picture) = gone.open(&path, PixelFrame::Upright) else { continue };
             let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
             if is_marked {
                 self.photos.push(name);
@@ -366,6 +370,17 @@ mod tests {
         let place = ProjectPlace::of_photo(&at("b.png")).unwrap();
         assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(FILE), whole));
         assert_eq!(ProjectPlace::of_photo(&at("a.png")).unwrap().file, at("a.sdg-project.json"));
+    }
+
+    #[test]
+    fn a_project_is_compared_by_its_absolute_path() {
+        let here = std::env::current_dir().unwrap();
+        let photo = ProjectPlace::of_photo(Path::new("photo.png")).unwrap();
+        assert_eq!(photo.shown(), here.join("photo.sdg-project.json").display().to_string());
+        for folder in ["rod", "rod/", "./rod"] {
+            let place = ProjectPlace::of_folder(Path::new(folder));
+            assert_eq!(place.shown(), here.join("rod").display().to_string(), "{folder}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ mod tried;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sdg_demonstration::{Demonstration, ModelKind};
+use sdg_demonstration::{Demonstration, ModelKind, PixelFrame};
 use sdg_files::WriterLock;
 use tempfile::TempDir;
 
@@ -51,6 +51,8 @@ pub struct SessionOptions {
     pub token: Option<String>,
     /// The hand's maximum opening in pixels of a photo, in the part's plane; `None` without a camera's calibration.
     pub max_opening_px: Option<f64>,
+    /// Orientation of the pixels of all pictures: the sensor's with a camera's calibration.
+    pub pixel_frame: PixelFrame,
 }
 
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
@@ -85,6 +87,8 @@ pub struct Session {
     model_path: Option<PathBuf>,
     /// The user's files are written beside this path: the first picture, or the first photo to be taken.
     home: PathBuf,
+    /// Orientation of the pixels of all pictures.
+    pixel_frame: PixelFrame,
     live: Option<LiveDesk>,
     /// Folder for pictures added on the page before there is a photo.
     temporary: Option<TempDir>,
@@ -298,7 +302,8 @@ impl Session {
         let mut state = self.state();
         let path = self.next_photo()?;
         sdg_files::write_atomically(&path, &bytes)?;
-        let picture = Picture { name: file_name(&path), path, size: [frame.width(), frame.height()] };
+        let size = [frame.width(), frame.height()];
+        let picture = Picture { name: file_name(&path), path, size, frame: self.pixel_frame };
         let id = state.add_image(picture, Marks::default())?;
         self.settle_place(&mut state, id)?;
         state.save_project()?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use sdg_demonstration::{Annotation, Demonstration, ImageFacts, PixelFrame};
 use serde_json::Value;
 
 use crate::advice::advise;
@@ -137,16 +137,16 @@ impl State {
         self.trial_ids().map(|id| &self.trial_pictures[id]).filter(|trial| trial.is_absent).map(|trial| &trial.picture)
     }
 
-    /// [`fingerprint`] of the inputs that a teaching would have now. Coordinates are rounded to a thousandth of a
-    /// pixel: after reading from a file their last digits differ.
+    /// [`fingerprint`] of the inputs that a teaching would have now. Pictures are named as in the project's file, so
+    /// that it does not depend on the folder's path. Coordinates are rounded to a thousandth of a pixel: after reading
+    /// from a file their last digits differ.
     pub fn material(&self) -> String {
+        // Without a project there is neither a photo nor a model.
+        let folder = self.place.as_ref().map_or(Path::new(""), |place| &place.folder);
+        let name = |picture: &Picture| relative(folder, &picture.path);
         let marked = self.image_ids().map(|id| &self.images[id]).filter(|image| image.marks != Marks::default());
-        let marked: Vec<_> = marked.map(|image| (&image.picture.path, &image.marks)).collect();
-        let negatives: Vec<_> = self.negatives().map(|picture| &picture.path).collect();
-        // Paths that are not UTF-8 are converted lossily.
-        let text = |path: &PathBuf| path.to_string_lossy().into_owned();
-        let marked: Vec<_> = marked.into_iter().map(|(path, marks)| (text(path), marks)).collect();
-        let negatives: Vec<_> = negatives.into_iter().map(text).collect();
+        let marked: Vec<_> = marked.map(|image| (name(&image.picture), &image.marks)).collect();
+        let negatives: Vec<_> = self.negatives().map(name).collect();
         let mut material = serde_json::to_value((marked, negatives)).unwrap_or_default();
         round(&mut material);
         fingerprint(&material.to_string())
@@ -229,16 +229,18 @@ impl MarkedPicture {
     /// A picture with the marks in the file beside it, and the object's name in that file.
     ///
     /// # Errors
-    /// The picture cannot be read, or the marks belong to another picture.
-    pub fn open(path: &Path, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
-        Self::of(Picture::open(path)?, annotation)
+    /// The picture cannot be read, or the errors of [`of`](Self::of).
+    pub fn open(path: &Path, frame: PixelFrame) -> Result<(Self, Option<String>)> {
+        Self::of(Picture::open(path, frame)?, None)
     }
 
-    /// As [`open`](Self::open), for a picture that has been read.
+    /// As [`open`](Self::open), for a picture that has been read; `annotation` is the file of the marks if it is not
+    /// named after the picture.
     ///
     /// # Errors
-    /// The marks belong to another picture.
+    /// The marks belong to another picture, or an Exif orientation rotates a photo of a calibrated camera.
     pub fn of(picture: Picture, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
+        picture.check_is_markable()?;
         let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
         // The file that was read, not the file for changes, which may not exist yet.
         let found = opened.found.filter(|_| opened.marks.has_object());

@@ -146,7 +146,8 @@ pub struct SessionView {
     pub region: Option<Region>,
     /// Whether the camera of the photos is calibrated; the part's size is then known.
     pub is_calibrated: bool,
-    /// The project: its folder, or the file of a photo's project; `None` for a camera before its first photo.
+    /// Absolute path of the project's folder, or of the file of a photo's project; `None` for a camera before its first
+    /// photo.
     pub project: Option<String>,
     /// Whether the page can close this project and choose another.
     pub can_close: bool,

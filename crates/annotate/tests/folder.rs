@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::served::{InPlace, Served, photo_png};
+use crate::served::{InPlace, Served, photo, photo_png};
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
 use sdg_annotate::{Session, SessionOptions};
 use serde_json::{Value, json};
 
@@ -17,6 +19,17 @@ fn folder_of(names: &[&str]) -> tempfile::TempDir {
         std::fs::write(folder.path().join(name), photo_png()).unwrap();
     }
     folder
+}
+
+/// The photo with an Exif orientation that rotates it by 180°.
+fn turned_png() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = PngEncoder::new(&mut bytes);
+    // Big endian, one entry: tag 0x0112 (orientation), a short.
+    let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0";
+    encoder.set_exif_metadata(exif.to_vec()).unwrap();
+    photo().write_with_encoder(encoder).unwrap();
+    bytes
 }
 
 fn session(served: &Served) -> Value {
@@ -106,6 +119,27 @@ fn a_given_picture_that_is_unreadable_is_refused() {
         let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
         assert!(refused.contains("cut.png: damaged PNG image"), "{refused}");
     }
+}
+
+#[test]
+fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos_are_refused() {
+    let served = Served::of_calibrated_project(folder_of(&["rod.png"]));
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    served.ask("POST", "/api/trial-pictures?name=turned.png", &turned_png()).json();
+    // The sensor's pixels are those of the photo, in the search and in the browser.
+    let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
+    assert_eq!(found["detections"][0]["is_accepted"], true);
+    let shown = image::load_from_memory(&served.ask("GET", "/api/trial-pictures/0/picture", b"").body).unwrap();
+    let red = [[45, 50], [154, 50]].map(|[x, y]| shown.to_rgb8().get_pixel(x, y).0[0] > 128);
+    assert_eq!(red, [true, false], "the part is at the left");
+    for (path, body) in
+        [("/api/images?name=turned.png", turned_png()), ("/api/trial-pictures/0/accept", MARKS.as_bytes().to_vec())]
+    {
+        let refused = served.ask("POST", path, &body);
+        assert!(refused.status == 422 && refused.text().contains("Exif"), "{path}: {}", refused.text());
+    }
+    assert!(!served.folder.path().join("turned.png").exists());
 }
 
 #[test]

@@ -94,6 +94,20 @@ fn models_are_versions_and_marks_that_changed_make_them_stale() {
 }
 
 #[test]
+fn a_model_is_not_old_because_its_folder_was_renamed() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    try_photo(&served, "empty.png");
+    served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").json();
+    teach(&served);
+    let folder = served.end();
+    let renamed = tempfile::tempdir().unwrap();
+    // A folder may replace an empty one.
+    std::fs::rename(folder.path(), renamed.path()).unwrap();
+    assert_eq!(get(&Served::of_project(renamed))["models"][0]["is_stale"], false);
+}
+
+#[test]
 fn a_version_keeps_the_settings_of_the_part() {
     let served = project();
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();

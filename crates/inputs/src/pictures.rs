@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_demonstration::{ImageLimits, PixelFrame, decode_image_in, is_turned_by_exif};
+use sdg_demonstration::{ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
 use sdg_files::{read, read_bounded};
 
 /// Maximum size of a picture's file.
@@ -34,11 +34,7 @@ pub fn read_sensor_pixels_if_turned(photo: &Path) -> Result<Option<RgbImage>> {
 /// The photo is rotated, or its file cannot be read.
 pub fn check_is_not_turned(photo: &Path) -> Result<()> {
     if is_turned_by_exif(&read(photo, MAX_IMAGE_BYTES)?) {
-        bail!(
-            "{}: expected a photo of the calibrated camera without an Exif orientation that rotates it, found one \
-             with it: the calibration is for the sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks still fit, and mark it again if not",
-            photo.display()
-        );
+        bail!("{}: {}", photo.display(), PictureError::TurnedByExif);
     }
     Ok(())
 }

@@ -64,7 +64,7 @@ pub fn open_session(
 /// Opens a project chosen on the page: a folder or a photo.
 ///
 /// # Errors
-/// A file cannot be read or written, or is open in another process.
+/// A file cannot be read or written, or is open in another process; a photo of a calibrated camera is stored rotated.
 pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
     let is_folder = path.is_dir();
     let written = if is_folder { path.join(PROJECT_FILE) } else { sdg_annotate::project_of_photo(path)? };
@@ -80,7 +80,8 @@ pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
 }
 
 fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
-    let options = SessionOptions { max_opening_px: teacher.max_opening_px(), ..options };
+    let (max_opening_px, pixel_frame) = (teacher.max_opening_px(), teacher.pixel_frame());
+    let options = SessionOptions { max_opening_px, pixel_frame, ..options };
     Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
 }
 
@@ -100,4 +101,34 @@ fn lock(written: &Path) -> Result<Option<WriterLock>> {
         ),
         error => error.into(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::codecs::png::PngEncoder;
+    use image::{ImageEncoder, RgbImage};
+    use sdg_grasp::Preset;
+    use sdg_inputs::camera_files::CameraFile;
+
+    #[test]
+    fn a_project_with_a_rotated_photo_of_a_calibrated_camera_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut bytes = Vec::new();
+        let mut encoder = PngEncoder::new(&mut bytes);
+        // Big endian, one entry: tag 0x0112 (orientation), a short, 3 for a rotation by 180°.
+        let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0";
+        encoder.set_exif_metadata(exif.to_vec()).unwrap();
+        RgbImage::new(640, 480).write_with_encoder(encoder).unwrap();
+        std::fs::write(folder.path().join("photo.png"), bytes).unwrap();
+        let camera = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell/camera.yaml");
+        let camera = Some((CameraFile::read(&camera).unwrap(), [0.016, 0.009]));
+        let refused = [None, camera].map(|camera| {
+            let teacher = PageTeacher { preset: Preset::default(), camera };
+            open_chosen(&teacher, folder.path()).err().map(|error| error.to_string())
+        });
+        assert_eq!(refused[0], None);
+        let told = refused[1].as_deref().unwrap();
+        assert!(told.contains("photo.png: expected a photo of the calibrated camera without an Exif"), "{told}");
+    }
 }

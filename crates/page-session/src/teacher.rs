@@ -137,6 +137,11 @@ impl PageTeacher {
         Some(HAND_OPENING_MAX_M / scale)
     }
 
+    /// The orientation of the pixels of photos and of pictures to try: a calibration is for the sensor's pixels.
+    pub fn pixel_frame(&self) -> PixelFrame {
+        if self.camera.is_some() { PixelFrame::Sensor } else { PixelFrame::Upright }
+    }
+
     /// The options for opening the camera of live pictures. With a calibrated camera, pictures of its calibrated size
     /// in the sensor's orientation are requested.
     pub fn open_options(&self, mut options: OpenOptions) -> OpenOptions {

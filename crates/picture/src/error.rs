@@ -37,4 +37,11 @@ pub enum PictureError {
         height: u32,
         max_pixels: u64,
     },
+    /// An Exif orientation rotates a photo whose marks must be in the pixels of a calibrated camera.
+    #[error(
+        "expected a photo of the calibrated camera without an Exif orientation that rotates it, found one with it: the \
+         calibration is for the sensor's pixels; remove the tag (exiftool -Orientation= FILE), check whether the marks \
+         still fit, and mark it again if not"
+    )]
+    TurnedByExif,
 }

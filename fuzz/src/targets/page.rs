@@ -12,7 +12,7 @@ use sdg_annotate::{
     GraspTeacher, Live, LiveFrame, LiveOptions, LivePictures, RecentProjects, Region, Server, Session, SessionOptions,
     Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, PixelFrame};
 
 use super::bytes::{SEED_PORT, contains, replaced, split_at_marks};
 use super::cameras::exchange;
@@ -244,7 +244,12 @@ fn serve_start() -> Serving {
         let options = SessionOptions { project: Some(path.to_owned()), ..SessionOptions::default() };
         Ok(Session::open(&options, Arc::new(Unwilling))?)
     };
-    let start = Start { recent: Some(recent), folder: folder.path().to_owned(), open: Box::new(open) };
+    let start = Start {
+        recent: Some(recent),
+        folder: folder.path().to_owned(),
+        pixel_frame: PixelFrame::Upright,
+        open: Box::new(open),
+    };
     serve(folder, Server::bind_start(start, 0, Some(TOKEN)).expect("a port of this computer"))
 }
 

@@ -76,13 +76,14 @@ impl Session {
     /// Unknown picture, or not a picture file.
     pub(crate) fn other_picture(&self, id: usize) -> Result<Picture> {
         let path = self.state().other(id)?.to_owned();
-        Picture::open(&path)
+        Picture::open(&path, self.pixel_frame)
     }
 
     /// Makes another picture of the folder a photo of the part, with the marks beside it.
     ///
     /// # Errors
-    /// Unknown picture, marks of another picture, or the project cannot be written.
+    /// Unknown picture, marks of another picture, a photo of a calibrated camera that an Exif orientation rotates, or
+    /// the project cannot be written.
     pub fn add_photo(&self, id: usize) -> Result<ImageView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
@@ -94,7 +95,7 @@ impl Session {
                 id
             }
             None => {
-                let (image, label) = MarkedPicture::open(&path, None)?;
+                let (image, label) = MarkedPicture::open(&path, self.pixel_frame)?;
                 if let Some(label) = label.filter(|_| !state.is_named) {
                     (state.label, state.is_named) = (label, true);
                 }
@@ -123,7 +124,7 @@ impl Session {
                 id
             }
             None => {
-                state.trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
+                state.trial_pictures.push(TrialPicture::new(Picture::open(&path, self.pixel_frame)?, false));
                 state.trial_pictures.len() - 1
             }
         };
@@ -135,10 +136,11 @@ impl Session {
     /// lies there already.
     ///
     /// # Errors
-    /// The bytes are not a picture, or the file cannot be written.
+    /// The bytes are not a picture, an Exif orientation rotates a photo of a calibrated camera, or the file cannot be
+    /// written.
     pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
         let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
-        Picture::check(bytes, shown)?;
+        Picture::check_photo(bytes, shown, self.pixel_frame)?;
         if let Some(id) = self.same_other(shown, bytes) {
             return self.add_photo(id);
         }
@@ -146,7 +148,7 @@ impl Session {
         let mut state = self.state();
         let path = free_name(&self.home, shown, if extension.is_empty() { "png" } else { &extension });
         sdg_files::write_atomically(&path, bytes)?;
-        let (image, _) = MarkedPicture::open(&path, None)?;
+        let (image, _) = MarkedPicture::open(&path, self.pixel_frame)?;
         state.images.push(image);
         let id = state.images.len() - 1;
         self.settle_place(&mut state, id)?;

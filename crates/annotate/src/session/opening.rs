@@ -20,8 +20,9 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a given picture that cannot be read, or marks that belong to another picture.
-    /// Unreadable pictures of the project or of a folder are left out; the notes for the user name them.
+    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture, or a
+    /// photo of a calibrated camera that an Exif orientation rotates. Unreadable pictures of the project or of a folder
+    /// are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -49,7 +50,8 @@ impl Session {
         let mut images = Vec::new();
         for (idx, (path, annotation)) in photos.iter().enumerate() {
             let is_given = idx < options.images.len();
-            let opened = if is_given { Some(Picture::open(path)?) } else { gone.open(path) };
+            let frame = options.pixel_frame;
+            let opened = if is_given { Some(Picture::open(path, frame)?) } else { gone.open(path, frame) };
             let Some(picture) = opened else {
                 gone.photos.push(relative(&folder, path));
                 continue;
@@ -58,7 +60,7 @@ impl Session {
             label = label.take().or(named);
             images.push(image);
         }
-        let trial_pictures = trial_pictures(&project, &folder, &images, &options.trial_pictures, &mut gone)?;
+        let trial_pictures = trial_pictures(&project, &folder, &images, options, &mut gone)?;
         let mut notes = std::mem::take(&mut gone.notes);
         let temporary = match place {
             Some(_) => None,
@@ -122,6 +124,7 @@ impl Session {
             previews: Previews::default(),
             model_path: options.model_path.clone(),
             home,
+            pixel_frame: options.pixel_frame,
             live: options.live.clone().map(LiveDesk::new),
             temporary,
             locks: Vec::new(),
@@ -165,12 +168,13 @@ fn trial_pictures(
     project: &ProjectFile,
     folder: &Path,
     images: &[MarkedPicture],
-    named: &[PathBuf],
+    options: &SessionOptions,
     gone: &mut Gone,
 ) -> Result<Vec<TrialPicture>> {
+    let frame = options.pixel_frame;
     let mut trial_pictures: Vec<TrialPicture> = Vec::new();
     for tried in &project.tried {
-        let Some(opened) = gone.open(&folder.join(&tried.file)) else {
+        let Some(opened) = gone.open(&folder.join(&tried.file), frame) else {
             gone.tried.push(tried.clone());
             continue;
         };
@@ -179,7 +183,7 @@ fn trial_pictures(
         let became = tried.became.as_ref().and_then(|photo| images.iter().position(|image| is(photo, image)));
         trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
     }
-    for path in named {
+    for path in &options.trial_pictures {
         let is_folder = path.is_dir();
         let paths = if is_folder { pictures_in(path)? } else { vec![path.clone()] };
         for path in paths {
@@ -189,7 +193,7 @@ fn trial_pictures(
             if taken {
                 continue;
             }
-            let opened = if is_folder { gone.open(&path) } else { Some(Picture::open(&path)?) };
+            let opened = if is_folder { gone.open(&path, frame) } else { Some(Picture::open(&path, frame)?) };
             trial_pictures.extend(opened.map(|picture| TrialPicture::new(picture, false)));
         }
     }

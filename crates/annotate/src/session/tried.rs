@@ -58,7 +58,7 @@ impl Session {
         std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
         let path = free_name(&folder.join("picture"), &shown, extension);
         sdg_files::write_atomically(&path, bytes)?;
-        let picture = Picture::open(&path).map_err(|error| {
+        let picture = Picture::open(&path, self.pixel_frame).map_err(|error| {
             // Invalid pictures are not kept.
             let _ = std::fs::remove_file(&path);
             match error {
@@ -185,7 +185,8 @@ impl Session {
     /// copied beside the first picture under an unused name: no marks are written into other folders.
     ///
     /// # Errors
-    /// Unknown picture, the picture is a demonstration already, or a file cannot be written.
+    /// Unknown picture, the picture is a demonstration already, an Exif orientation rotates a picture of a calibrated
+    /// camera, or a file cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
@@ -193,6 +194,7 @@ impl Session {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
         let mut picture = trial.picture;
+        picture.check_is_markable()?;
         let folder_of = |path: &Path| std::path::absolute(path).ok()?.parent().map(Path::to_owned);
         if trial.uploaded || folder_of(&picture.path) != folder_of(&self.home) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();

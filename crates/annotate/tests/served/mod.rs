@@ -14,7 +14,7 @@ use sdg_annotate::{
     FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Region, Server, Session, SessionOptions,
     Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, PixelFrame};
 use sdg_geometry::{GraspLine, PlanarGrasp};
 use serde_json::Value;
 
@@ -224,6 +224,13 @@ impl Served {
         Self::open(folder, options, PATIENCE)
     }
 
+    /// Like [`Self::of_project`], with a calibrated camera.
+    pub fn of_calibrated_project(folder: tempfile::TempDir) -> Self {
+        let project = Some(folder.path().to_owned());
+        let options = SessionOptions { project, pixel_frame: PixelFrame::Sensor, ..SessionOptions::default() };
+        Self::open(folder, options, PATIENCE)
+    }
+
     /// A server for a photo in a folder.
     pub fn of_photo(folder: tempfile::TempDir, name: &str) -> Self {
         let images = vec![(folder.path().join(name), None)];
@@ -246,7 +253,12 @@ impl Served {
             noted.note(path)?;
             Ok(Session::open(&options, Arc::new(InPlace))?)
         };
-        let start = Start { recent: Some(recent), folder: folder.path().to_owned(), open: Box::new(open) };
+        let start = Start {
+            recent: Some(recent),
+            folder: folder.path().to_owned(),
+            pixel_frame: PixelFrame::Upright,
+            open: Box::new(open),
+        };
         Self::serve(folder, Server::bind_start(start, 0, None).unwrap())
     }
 

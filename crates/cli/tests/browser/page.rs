@@ -19,7 +19,8 @@ pub struct Page {
     pub browser: Browser,
     pub folder: TempDir,
     server: Child,
-    arguments: Vec<String>,
+    /// Arguments of the next start of the server.
+    pub arguments: Vec<String>,
     pub url: String,
 }
 

@@ -32,6 +32,18 @@ fn shown(page: &Page) {
     page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
 }
 
+/// A port that was free a moment ago.
+fn free_port() -> String {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string()
+}
+
+/// Waits until the browser keeps marks on photo.png that were not saved.
+fn are_kept(page: &Page) {
+    let kept = "return Object.entries(localStorage).some(([key, kept]) =>
+        key.startsWith('kept-marks:') && kept.includes('photo.png'))";
+    page.wait_for("kept here", kept);
+}
+
 fn teach_s(page: &Page, count: usize) {
     page.click("#tab-teach");
     page.choose_model("S");
@@ -320,9 +332,7 @@ fn unreadable_pictures_are_named_until_the_note_is_confirmed() {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
-    // A port that was free a moment ago.
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
-    let mut page = open(&["--port", &port, "--token-file", "key"], &["earlier", "photo"]);
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["earlier", "photo"]);
     // The photo is removed, restored and removed again: the restarted server gives the other photo the number of the
     // removed one.
     for again in [true, false] {
@@ -345,7 +355,7 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     for _ in 0..5 {
         page.browser.press(&["]"]).unwrap();
     }
-    page.wait_for("kept here", "return (localStorage.getItem('kept-marks') ?? '').includes('photo.png')");
+    are_kept(&page);
     assert!(page.text("#saved").starts_with("Not saved"), "{}", page.text("#saved"));
     // photo.json is a LabelMe file and stays unchanged: changes are written beside it.
     let saved = page.folder.path().join("project/photo.coco.json");
@@ -364,7 +374,10 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     let by = turned(&saved).degrees() - turned(&saved.with_file_name("photo.json")).degrees();
     assert!((by - 5.0).abs() < 0.1, "five keys turn by five degrees: {by}");
     assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
-    page.wait_for("nothing kept any more", "return localStorage.getItem('kept-marks') === null");
+    page.wait_for(
+        "nothing kept any more",
+        "return !Object.keys(localStorage).some((key) => key.startsWith('kept-marks'))",
+    );
 
     // Restarted with another token, the server refuses this page, which says what to do.
     page.stop_server();
@@ -374,6 +387,39 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     page.settle_frames();
     page.screenshot("project-9-another-key");
     page.assert_accessible("another key");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn kept_marks_wait_for_their_project_while_another_is_open_at_the_same_port() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
+    let [project, other] = ["project", "other"].map(|name| page.folder.path().join(name));
+    std::fs::create_dir(&other).unwrap();
+    for name in ["photo.png", "photo.json"] {
+        std::fs::copy(project.join(name), other.join(name)).unwrap();
+    }
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.browser.press(&["]"]).unwrap();
+    are_kept(&page);
+    page.browser.run("window.isOld = true", &[]).unwrap();
+    page.arguments[0] = "other".to_owned();
+    page.start_server();
+    page.wait_for(
+        "the other project",
+        "return !window.isOld && document.querySelectorAll('.todo li.done').length === 3",
+    );
+    // Longer than the interval at which the page checks the server and removes marks that were sent.
+    page.wait_for("a check of the server", "return new Promise((done) => setTimeout(() => done(true), 3500))");
+    assert_eq!(page.text("#saved"), "Saved in photo.json");
+    are_kept(&page);
+    page.stop_server();
+    page.arguments[0] = "project".to_owned();
+    page.start_server();
+    let sent = "return document.getElementById('saved')?.innerText === 'Saved in photo.coco.json'";
+    page.wait_for("the marks to be sent", sent);
+    let is_changed = [&project, &other].map(|folder| folder.join("photo.coco.json").exists());
+    assert_eq!(is_changed, [true, false]);
 }
 
 #[test]

@@ -68,6 +68,31 @@ fn a_hand_turned_by_half_a_turn_is_a_change() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn an_answer_of_the_model_before_is_discarded_and_the_picture_searched_again() {
+    let page = taught();
+    // The first answer is withheld until `window.answer` is called.
+    let withhold = "const send = window.fetch; window.answers = 0;
+        window.fetch = async (path, options) => {
+            const response = await send(path, options);
+            const isFirst = path.endsWith('/detect') && (window.answers += 1) === 1;
+            if (isFirst) await new Promise((done) => { window.answer = done; });
+            return response;
+        }";
+    page.browser.run(withhold, &[]).unwrap();
+    add(&page, &[("other.png".to_owned(), photo())]);
+    patiently(&page, "the first answer", "return window.answers === 1");
+    page.click("#tab-teach");
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
+    page.click("#tab-try");
+    page.browser.run("window.answer()", &[]).unwrap();
+    patiently(&page, "another search", "return window.answers === 2");
+    patiently(&page, "a grasp", "return document.getElementById('found').innerText.includes('Found the part')");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
     let page = taught();
     // The results of a second version are invented; they are inserted after the page has asked for the versions.

@@ -31,7 +31,12 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             )
             .into());
         }
-        let start = Start { recent: recent::projects(), folder: PathBuf::new(), open: opener(teacher) };
+        let start = Start {
+            recent: recent::projects(),
+            folder: PathBuf::new(),
+            pixel_frame: teacher.pixel_frame(),
+            open: opener(teacher),
+        };
         Server::bind_start(start, args.port, token.as_deref())?
     } else {
         let project = project(&args.images)?;
