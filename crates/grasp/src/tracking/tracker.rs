@@ -62,7 +62,7 @@ pub struct Tracker {
     next_id: u64,
     tracks: Vec<Tracked>,
     /// Tracks that are carried forward to the newest frame.
-    arriving: Vec<Track>,
+    pub(super) arriving: Vec<Track>,
     /// The frame that is being searched.
     searching: Option<u64>,
     /// The time at which the last search began.
