@@ -240,7 +240,7 @@ fn dry_run<A: Arm>(
         eprintln!("no motion is drawn: {missing}");
         return Ok(());
     }
-    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell.obstacles)? {
+    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

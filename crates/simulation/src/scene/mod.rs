@@ -135,8 +135,13 @@ impl SceneVariation {
 
     /// The scene as MJCF sections and their files.
     pub fn fragment(&self) -> MjcfFragment {
+        self.fragment_on_table(0.0)
+    }
+
+    /// As [`Self::fragment`], with the table's top at another z (m). The objects stay where they are.
+    pub(crate) fn fragment_on_table(&self, table_height_m: f64) -> MjcfFragment {
         let mut fragment = self.lighting.fragment();
-        fragment.append(self.table.fragment());
+        fragment.append(self.table.fragment(table_height_m));
         if let Some(object) = &self.object {
             fragment.append(object.spec.fragment(&object.base_from_object));
         }
