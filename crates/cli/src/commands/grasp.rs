@@ -143,6 +143,7 @@ fn prepare(args: &GraspArgs) -> Result<GraspTask> {
 fn simulated(args: &GraspArgs, task: &GraspTask, interrupt: &Interrupt) -> Result<Outcome> {
     use sdg_simulation::{RenderConfig, WorkcellConfig};
 
+    robots::check_simulated(&task.workcell, &args.workcell)?;
     let Address::Sim(text) = &args.from else {
         let found = &args.from;
         return Err(

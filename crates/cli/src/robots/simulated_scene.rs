@@ -1,6 +1,9 @@
-//! `sim:PART?seed=N` for a simulated arm: the scene on its table.
+//! `sim:PART?seed=N` for a simulated arm: the scene on its table; and workcells that are not simulated.
 
-use anyhow::Result;
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use sdg_robot::workcell::{RobotModel, Workcell};
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 
 use crate::exit::Usage;
@@ -21,6 +24,30 @@ pub(crate) fn simulated_scene(text: &str) -> Result<SceneVariation> {
         })?;
     }
     Ok(SceneVariation::sample(Some(&part), &VariationConfig::default(), seed))
+}
+
+/// Rejects a workcell that differs from the simulated one: a Panda at a table of the height of its base.
+///
+/// # Errors
+/// Another model, or another height; the error names the workcell's file.
+pub(crate) fn check_simulated(workcell: &Workcell, path: &Path) -> Result<()> {
+    if workcell.robot != RobotModel::Panda {
+        let found = workcell.robot.name();
+        bail!("{}: model: expected \"panda\", the simulated arm, found \"{found}\"", path.display());
+    }
+    check_table_height(workcell, path)
+}
+
+/// Rejects a workcell whose table is not at the height of the base, as the simulated one is.
+///
+/// # Errors
+/// Another height; the error names the workcell's file.
+pub(crate) fn check_table_height(workcell: &Workcell, path: &Path) -> Result<()> {
+    if workcell.table_height_m != 0.0 {
+        let found_mm = workcell.table_height_m * 1e3;
+        bail!("{}: height_mm: expected 0, the simulated table's height, found {found_mm}", path.display());
+    }
+    Ok(())
 }
 
 #[cfg(test)]
