@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2};
-use sdg_cell::{CameraPose, ModelFinder, MountedCamera, part_shape};
+use sdg_cell::{CameraPose, ModelFinder, MountedCamera, footprints_on_table, part_shape};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::ArmGeometry;
@@ -217,8 +217,9 @@ impl Rehearsal<'_> {
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let mut variation = VariationConfig::default();
-        if self.place.is_some() {
+        if let Some(place) = &self.place {
             variation.distractors = 0..=0;
+            variation.taken = footprints_on_table(&place.obstacles);
         }
         let scene = SceneVariation::sample(Some(self.object), &variation, seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);

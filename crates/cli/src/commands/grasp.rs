@@ -150,7 +150,7 @@ fn simulated(args: &GraspArgs, task: &GraspTask, interrupt: &Interrupt) -> Resul
             Usage(format!("--from: with --robot sim expected sim:PART or sim:PART?seed=N, found {found}")).into()
         );
     };
-    let scene = robots::simulated_scene(text)?;
+    let scene = robots::simulated_scene(text, &task.workcell.obstacles)?;
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(task.camera.intrinsics),
         camera_pose: Some(task.camera.pose),
