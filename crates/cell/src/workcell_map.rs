@@ -1,14 +1,15 @@
 //! The map of a workcell. The base's x points right, its y points up.
 
 use image::{Rgb, RgbImage};
-use nalgebra::{Point2, Point3};
-use sdg_geometry::{BoundingBox, Polygon, convex_hull};
-use sdg_kinematics::collision::{Obstacle, Shape};
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, Polygon};
+use sdg_kinematics::collision::Obstacle;
 use sdg_report::{Color, Pen, draw_box, draw_label, draw_line, draw_polygon, label_bounds, shade_polygon};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{LookOut, Place};
 
 use crate::hand_reach::Reach;
+use crate::obstacle_outline::seen_from_above;
 
 /// Pixels per metre of the map.
 const PX_PER_M: f64 = 720.0;
@@ -248,53 +249,4 @@ impl Labels {
 
 fn pen(color: Color, width: f64) -> Pen {
     Pen::new(color).width(width).without_halo()
-}
-
-/// The outline of an obstacle from above; `None` for a plane.
-fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
-    let Obstacle { shape, base_from_obstacle, .. } = obstacle;
-    let ring = |radius_m: f64, z: f64| {
-        (0..48).map(move |i| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
-            Point3::new(radius_m * cos, radius_m * sin, z)
-        })
-    };
-    let points: Vec<Point3<f64>> = match *shape {
-        Shape::Plane => return None,
-        Shape::Box { half_m: [a, b, c] } => {
-            let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-            (0..8).map(|i| Point3::new(sign(i, 0) * a, sign(i, 1) * b, sign(i, 2) * c)).collect()
-        }
-        Shape::Cylinder { radius_m, half_length_m } => {
-            [-half_length_m, half_length_m].into_iter().flat_map(|z| ring(radius_m, z)).collect()
-        }
-        Shape::Capsule { radius_m, half_length_m } => {
-            // Spheres at both ends: a circle around each, in any orientation.
-            let ends = [-half_length_m, half_length_m].map(|z| base_from_obstacle * Point3::new(0.0, 0.0, z));
-            let circles =
-                ends.iter().flat_map(|end| ring(radius_m, 0.0).map(move |p| Point2::new(end.x + p.x, end.y + p.y)));
-            return Some(convex_hull(circles.collect::<Vec<_>>()));
-        }
-    };
-    Some(convex_hull(points.iter().map(|p| (base_from_obstacle * p).xy()).collect::<Vec<_>>()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::Isometry3;
-
-    fn obstacle(shape: Shape, base_from_obstacle: Isometry3<f64>) -> Obstacle {
-        Obstacle { name: "o".to_owned(), shape, base_from_obstacle }
-    }
-
-    #[test]
-    fn obstacles_are_seen_from_above() {
-        let turned =
-            Isometry3::new(nalgebra::Vector3::new(0.5, 0.1, 0.2), nalgebra::Vector3::z() * std::f64::consts::FRAC_PI_2);
-        let outline = seen_from_above(&obstacle(Shape::Box { half_m: [0.1, 0.02, 0.3] }, turned)).unwrap();
-        let reach = |f: fn(&Point2<f64>) -> f64| outline.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
-        assert!((reach(|p| p.x) - 0.52).abs() < 1e-9 && (reach(|p| p.y) - 0.2).abs() < 1e-9, "{outline:?}");
-        assert_eq!(seen_from_above(&obstacle(Shape::Plane, turned)), None);
-    }
 }

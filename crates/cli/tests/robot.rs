@@ -161,6 +161,12 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&nowhere, &sim, 1, &["nowhere.toml: line 30: missing field `at_mm`"]);
     let model_name = write("robot.toml", "\"panda\"", "\"ur5\"");
     grasp(&model_name, &sim, 1, &["robot.toml: line 6: model: expected \"panda\" or \"fr3\", found \"ur5\""]);
+    let shipped_camera = shipped("workcell/camera.yaml");
+    let simulated = [&sim[..], &["--camera", text(&shipped_camera)]].concat();
+    let higher = write("higher.toml", "height_mm = 0.0", "height_mm = 20");
+    grasp(&higher, &simulated, 1, &["higher.toml: height_mm: expected 0, the simulated table's height, found 20"]);
+    let other_arm = write("fr3.toml", "\"panda\"", "\"fr3\"");
+    grasp(&other_arm, &simulated, 1, &["fr3.toml: model: expected \"panda\", the simulated arm, found \"fr3\""]);
     // The path of the camera file is relative to the workcell file's folder.
     let moved = write("moved.toml", "format = 1", "format = 1");
     grasp(&moved, &sim, 1, &["camera.yaml"]);

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use sdg_cell::{DryRun, SeenOutline};
-use sdg_kinematics::collision::Obstacle;
 use sdg_kinematics::{JointVector, Trajectory};
 use sdg_report::{Animation, AnimationOptions};
 use sdg_robot::PlannedArm;
@@ -62,8 +61,17 @@ impl MotionDrawing {
     }
 }
 
-/// Draws the motion and the detected part, as an animation and its last picture, into files in a folder. Returns the
-/// files. The part stays at its detected position on the table.
+/// The robot, the table and the obstacles of a workcell.
+fn drawn_cell(workcell: &CellFile) -> WorkcellConfig {
+    WorkcellConfig {
+        obstacles: workcell.obstacles.clone(),
+        table_height_m: workcell.table_height_m,
+        ..WorkcellConfig::new(SceneVariation::nominal(None))
+    }
+}
+
+/// Draws the motion and the detected part in a workcell, as an animation and its last picture, into files in a folder.
+/// Returns the files. The part stays at its detected position on the table.
 ///
 /// # Errors
 /// Files cannot be written, or rendering fails.
@@ -71,11 +79,10 @@ pub fn draw_dry_run(
     plan: &DryRun,
     folder: &Path,
     seen: Option<&SeenOutline>,
-    obstacles: &[Obstacle],
+    workcell: &CellFile,
 ) -> Result<Vec<PathBuf>> {
     let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
-    let obstacles = obstacles.to_vec();
-    let config = WorkcellConfig { seen_part, obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
+    let config = WorkcellConfig { seen_part, ..drawn_cell(workcell) };
     let period_secs = DRY_RUN.period_secs(plan.arm.duration_secs());
     let positions = PlannedArm::frames(&plan.start.q_commanded, plan.opening_m, plan.arm.actions(), period_secs);
     DRY_RUN.draw(folder, &config, &positions)
@@ -91,8 +98,6 @@ pub fn draw_motions(
     motions: &[Trajectory],
     opening_m: f64,
 ) -> Result<Vec<PathBuf>> {
-    let obstacles = workcell.obstacles.clone();
-    let config = WorkcellConfig { obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
     let period_secs = PLAN.period_secs(motions.iter().map(Trajectory::duration_secs).sum());
     let mut positions = Vec::new();
     for motion in motions {
@@ -103,5 +108,21 @@ pub fn draw_motions(
             positions.push((q, opening_m));
         }
     }
-    PLAN.draw(folder, &config, &positions)
+    PLAN.draw(folder, &drawn_cell(workcell), &positions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_drawn_at_the_height_of_the_workcell() {
+        let shipped = include_str!("../../../datasets/workcell/workcell.toml");
+        for (height_mm, expected_m) in [("-100", -0.1), ("20", 0.02)] {
+            let text = shipped.replace("height_mm = 0.0", &format!("height_mm = {height_mm}"));
+            let drawn = Workcell::new(&drawn_cell(&CellFile::from_toml(&text).unwrap())).unwrap();
+            let table = drawn.data().model().id("table").unwrap();
+            assert!((drawn.data().world_from_geom(table).translation.z - expected_m).abs() < 1e-9, "{height_mm}");
+        }
+    }
 }

@@ -10,14 +10,14 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2};
-use sdg_cell::{CameraPose, ModelFinder, MountedCamera, part_shape};
+use sdg_cell::{CameraPose, ModelFinder, MountedCamera, footprints_on_table, part_shape};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::ArmGeometry;
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::workcell::Workcell as WorkcellFile;
-use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Place, PlaceGoal, PlacingConfig};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Load, Place, PlaceGoal, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::views::base_from_look_camera;
@@ -58,6 +58,12 @@ pub struct RehearsedPlace {
     pub cell: Option<u32>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
+    /// Extent of the part to all sides of its grasp, m.
+    pub part_radius_m: f64,
+    /// Force of each finger, N.
+    pub grasp_force_n: f64,
+    /// The load while the part is held, if the workcell states it.
+    pub load: Option<Load>,
 }
 
 impl RehearsedPlace {
@@ -75,7 +81,19 @@ impl RehearsedPlace {
         }
         let cell = cell.and_then(|cell| cell.parse().ok());
         let place = place.expect("a name that the workcell knows");
-        Ok(Self { place, cell, obstacles: workcell.obstacles })
+        let GraspConfig { obstacles, part_radius_m, grasp_force_n, load, .. } = workcell.grasp_config();
+        Ok(Self { place, cell, obstacles, part_radius_m, grasp_force_n, load })
+    }
+
+    /// The sequence's settings: those of the workcell, with the look-out poses of rehearsals.
+    fn grasp_config(&self) -> GraspConfig {
+        GraspConfig {
+            obstacles: self.obstacles.clone(),
+            part_radius_m: self.part_radius_m,
+            grasp_force_n: self.grasp_force_n,
+            load: self.load,
+            ..GraspConfig::default()
+        }
     }
 }
 
@@ -199,20 +217,21 @@ impl Rehearsal<'_> {
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let mut variation = VariationConfig::default();
-        if self.place.is_some() {
+        if let Some(place) = &self.place {
             variation.distractors = 0..=0;
+            variation.taken = footprints_on_table(&place.obstacles);
         }
         let scene = SceneVariation::sample(Some(self.object), &variation, seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
-        let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
         // As with a real arm, shape and symmetry of the part are those of the model.
         let model = self.told_model(number)?;
-        let grasp = GraspConfig { obstacles: obstacles.clone(), part: part_shape(&model), ..GraspConfig::default() };
+        let of_cell = self.place.as_ref().map(RehearsedPlace::grasp_config).unwrap_or_default();
+        let grasp = GraspConfig { part: part_shape(&model), ..of_cell };
         let mut workcell = Workcell::new(&WorkcellConfig {
             errors,
             wrist_camera: self.camera,
-            obstacles,
+            obstacles: grasp.obstacles.clone(),
             ..WorkcellConfig::new(scene)
         })?;
         let camera = MountedCamera {
@@ -338,5 +357,20 @@ mod tests {
     fn attempts_of_neighbouring_seeds_differ() {
         let seeds = |seed| (1..=50).map(move |number| attempt_seed(seed, number));
         assert!(seeds(1).all(|one| seeds(2).all(|other| one != other)));
+    }
+
+    #[test]
+    fn a_rehearsed_place_keeps_the_tool_of_its_workcell() {
+        let tray = "\n[[tray]]\nname = \"tray\"\nfirst_mm = [350, 320]\ncolumns = 2\nrows = 2\npitch_mm = [180, 80]\n";
+        let text = include_str!("../../../datasets/workcell/workcell.toml").to_owned() + tray;
+        let grasp_of = |text: &str| {
+            let workcell = WorkcellFile::from_toml(text).unwrap();
+            RehearsedPlace::named("tray", workcell).unwrap().grasp_config()
+        };
+        assert_eq!(grasp_of(&text), GraspConfig::default());
+        let tool = "grasp_force_n = 20\npart_radius_mm = 120\npart_mass_kg = 0.5";
+        let grasp = grasp_of(&text.replace("grasp_force_n = 40.0", tool));
+        assert_eq!((grasp.part_radius_m, grasp.grasp_force_n), (0.12, 20.0));
+        assert_eq!(grasp.load.unwrap().mass_kg, 0.5);
     }
 }

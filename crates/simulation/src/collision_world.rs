@@ -9,7 +9,7 @@ use sdg_kinematics::collision::Obstacle;
 use crate::data::Data;
 use crate::error::Result;
 use crate::model::{Asset, Geom, Id, Model};
-use crate::obstacles::obstacles_mjcf;
+use crate::obstacles::{obstacle_of_geom, obstacles_mjcf};
 use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
 
 /// Two overlapping bodies.
@@ -57,7 +57,9 @@ impl CollisionWorld {
         let names = model
             .ids::<Geom>()
             .map(|geom| match model.name(model.body_of(geom)).as_deref() {
-                None | Some("world") => model.name(geom).unwrap_or_default(),
+                None | Some("world") => {
+                    model.name(geom).map(|name| obstacle_of_geom(&name).to_owned()).unwrap_or_default()
+                }
                 Some(body) => body.to_owned(),
             })
             .collect();

@@ -10,9 +10,10 @@ use sdg_geometry::PinholeCamera;
 
 use crate::camera::vertical_field_of_view_rad;
 use crate::error::{Result, SimulationError};
-use crate::render::RenderConfig;
+use crate::render::{MAX_SIDE_PX, RenderConfig};
 
-/// Resolution of the rendered picture relative to the result; above 1 so that resampling keeps the sharpness.
+/// Resolution of the rendered picture relative to the result; above 1 so that resampling keeps the sharpness. It is
+/// lower for cameras whose rendered picture would be larger than [`MAX_SIDE_PX`].
 const FINENESS: f64 = 1.5;
 /// Number of samples per pixel along each axis.
 const SAMPLES: u32 = 2;
@@ -52,8 +53,9 @@ impl Frustum {
                 half = half.sup(&camera.unproject(&Point2::new(x, y))?.xy().coords.abs());
             }
         }
-        let focal_px = FINENESS * camera.fx.max(camera.fy);
-        // The interpolation needs one more pixel on each side.
+        // The interpolation needs one more pixel on each side; half a pixel is for rounding errors.
+        let max_half_px = 0.5 * f64::from(MAX_SIDE_PX) - 1.5;
+        let focal_px = (FINENESS * camera.fx.max(camera.fy)).min(max_half_px / half.max());
         let side = |half: f64| (2.0 * (half * focal_px).ceil() + 2.0) as u32;
         Some(Self { width: side(half.x), height: side(half.y), focal_px })
     }
@@ -93,6 +95,18 @@ impl Frustum {
 mod tests {
     use super::*;
     use sdg_geometry::PlumbBob;
+
+    #[test]
+    fn the_rendered_picture_of_a_large_camera_can_be_rendered() {
+        let [width, height] = [5472_u32, 3648];
+        let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
+        let large = PinholeCamera { width, height, fx: 5000.0, fy: 5000.0, cx, cy, lens: PlumbBob::NONE };
+        let frustum = Frustum::around(&large).unwrap();
+        assert!((8000..=MAX_SIDE_PX).contains(&frustum.width) && frustum.height <= MAX_SIDE_PX, "{frustum:?}");
+        // The limit changes no other camera.
+        let usual = PinholeCamera::WRIST;
+        assert_eq!(Frustum::around(&usual).unwrap().focal_px, FINENESS * usual.fx.max(usual.fy));
+    }
 
     /// A rendered bright disc is at the position that the camera's own projection gives.
     #[test]

@@ -9,7 +9,15 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::scene::pose_attributes;
 
-/// Geoms of the world body for obstacles, with the obstacles' names; `attributes` is added to each geom.
+/// Prefix of the names of obstacles' geoms: an obstacle may have the name of another geom of the scene.
+const GEOM_PREFIX: &str = "obstacle ";
+
+/// Name of the obstacle of a geom. A geom of the scene itself, such as the table, keeps its name.
+pub(crate) fn obstacle_of_geom(geom: &str) -> &str {
+    geom.strip_prefix(GEOM_PREFIX).unwrap_or(geom)
+}
+
+/// Geoms of the world body for obstacles, each named `obstacle NAME`; `attributes` is added to each geom.
 pub fn obstacles_mjcf(obstacles: &[Obstacle], attributes: &str) -> String {
     let mut geoms = String::new();
     for obstacle in obstacles {
@@ -25,7 +33,7 @@ pub fn obstacles_mjcf(obstacles: &[Obstacle], attributes: &str) -> String {
             }
         };
         let pose = pose_attributes(&obstacle.base_from_obstacle);
-        let name = escaped(&obstacle.name);
+        let name = escaped(&format!("{GEOM_PREFIX}{}", obstacle.name));
         writeln!(geoms, "<geom name=\"{name}\" {shape} {pose} {attributes}/>").expect("a string takes any text");
     }
     geoms
@@ -78,7 +86,7 @@ mod tests {
         let xml = format!("<mujoco><worldbody>{}</worldbody></mujoco>", obstacles_mjcf(&obstacles, "rgba='1 0 0 1'"));
         let model = Model::from_xml(&xml, &[]).unwrap();
         for obstacle in &obstacles {
-            model.id::<Geom>(&obstacle.name).unwrap();
+            model.id::<Geom>(&format!("{GEOM_PREFIX}{}", obstacle.name)).unwrap();
         }
         assert_eq!(random_obstacles(40, 1)[5], obstacles[5]);
         assert_ne!(random_obstacles(40, 2)[5], obstacles[5]);

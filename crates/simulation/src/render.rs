@@ -20,6 +20,9 @@ use crate::error::{Result, SimulationError};
 use crate::guard::guarded;
 use crate::model::{Camera, Geom, Id, Model};
 
+/// Largest width and height of a picture, in pixels.
+pub(crate) const MAX_SIDE_PX: u32 = 8192;
+
 /// Settings of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RenderConfig {
@@ -112,10 +115,10 @@ impl Renderer {
     /// fails, [`SimulationError::Configuration`] for a width or height that is not between 1 and 8192 pixels.
     pub fn new(model: &Arc<Model>, config: RenderConfig) -> Result<Self> {
         for (field, value) in [("render width", config.width), ("render height", config.height)] {
-            if !(1..=8192).contains(&value) {
+            if !(1..=MAX_SIDE_PX).contains(&value) {
                 return Err(SimulationError::Configuration {
                     field,
-                    expected: "1 to 8192 pixels".into(),
+                    expected: format!("1 to {MAX_SIDE_PX} pixels"),
                     found: value.to_string(),
                 });
             }

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_kinematics::collision::{Checker, CollisionModel};
+use sdg_kinematics::collision::{Checker, CollisionModel, Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
-use sdg_simulation::{CollisionWorld, SimulationError, random_obstacles};
+use sdg_simulation::scene::SceneVariation;
+use sdg_simulation::{CollisionWorld, SimulationError, Workcell, WorkcellConfig, random_obstacles};
 
 /// Largest depth of an overlap in MuJoCo that the model misses, m.
 const MAX_MISSED_M: f64 = 0.003;
@@ -30,6 +32,20 @@ fn a_configuration_that_is_not_finite_is_no_free_one() {
         assert!(matches!(world.deepest(&q), Err(SimulationError::Unstable { .. })), "{value}");
     }
     assert!(world.deepest(&sdg_kinematics::ready_pose()).is_ok());
+}
+
+#[test]
+fn an_obstacle_may_have_the_name_of_a_geom_of_the_scene() {
+    // The plane is at the height of the hand, so that the arm overlaps it.
+    let obstacles = vec![Obstacle {
+        name: "floor".to_owned(),
+        shape: Shape::Plane,
+        base_from_obstacle: Isometry3::translation(0.0, 0.0, 0.6),
+    }];
+    let mut world = CollisionWorld::new(&obstacles, 0.08).unwrap();
+    let overlap = world.deepest(&sdg_kinematics::ready_pose()).unwrap().unwrap();
+    assert!(overlap.between.iter().any(|name| name == "floor"), "{overlap:?}");
+    Workcell::new(&WorkcellConfig { obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) }).unwrap();
 }
 
 #[test]

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nalgebra::Isometry3;
+use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{JointLimits, JointVector, Trajectory, ready_pose};
 use sdg_robot::{
     Arm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, HandCommand, PartFinder, Robot, RobotError,
@@ -35,11 +37,16 @@ fn run(robot: &mut Robot<'_, Workcell>) -> sdg_robot::Result<GraspReport> {
     grasp(robot, &mut Truth, &mut (), mount, &GraspConfig::default())
 }
 
+/// A motion that rotates joint 1 from the arm's position.
+fn rotation_by(robot: &mut Robot<'_, Workcell>, angle_rad: f64) -> Trajectory {
+    let start = robot.arm().state().unwrap().q_commanded;
+    let end = start + JointVector::from([angle_rad, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    Trajectory::point_to_point(&start, &end, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
+}
+
 /// A safe motion from the arm's position.
 fn some_motion(robot: &mut Robot<'_, Workcell>) -> Trajectory {
-    let start = robot.arm().state().unwrap().q_commanded;
-    let end = start + JointVector::from([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    Trajectory::point_to_point(&start, &end, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
+    rotation_by(robot, 0.1)
 }
 
 /// Checks that motions and commands of the hand are refused, and that the arm does not move while time passes.
@@ -69,6 +76,27 @@ fn nothing_is_wrong_without_a_fault() {
     assert_eq!(report.outcome, GraspOutcome::Held);
     assert_eq!(report.hand_verdicts, [GraspStep::Close, GraspStep::Lift, GraspStep::Hold].map(|step| (step, None)));
     assert_eq!(robot.latched(), None);
+}
+
+#[test]
+fn the_obstacle_that_blocks_the_arm_is_named() {
+    // "linkage" begins like the arm's "link1".
+    for name in ["wall", "linkage"] {
+        // 80 mm from the hand, which has its fingers along y.
+        let obstacle = Obstacle {
+            name: name.to_owned(),
+            shape: Shape::Box { half_m: [0.2, 0.02, 0.2] },
+            base_from_obstacle: Isometry3::translation(0.4, 0.2, 0.5),
+        };
+        let scene = SceneVariation::nominal(None);
+        let config = WorkcellConfig { obstacles: vec![obstacle], ..WorkcellConfig::new(scene) };
+        let mut cell = Workcell::new(&config).unwrap();
+        let mut robot = Robot::new(&mut cell, Workcell::safety_limits(), Watch::default());
+        let motion = rotation_by(&mut robot, 0.8);
+        let error = robot.follow(motion).unwrap_err();
+        let RobotError::Blocked(by) = &error else { panic!("{error}") };
+        assert!(by.contains(&format!(" on {name}")) && !by.contains("the table"), "{by}");
+    }
 }
 
 #[test]

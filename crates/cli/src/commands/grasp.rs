@@ -143,13 +143,14 @@ fn prepare(args: &GraspArgs) -> Result<GraspTask> {
 fn simulated(args: &GraspArgs, task: &GraspTask, interrupt: &Interrupt) -> Result<Outcome> {
     use sdg_simulation::{RenderConfig, WorkcellConfig};
 
+    robots::check_simulated(&task.workcell, &args.workcell)?;
     let Address::Sim(text) = &args.from else {
         let found = &args.from;
         return Err(
             Usage(format!("--from: with --robot sim expected sim:PART or sim:PART?seed=N, found {found}")).into()
         );
     };
-    let scene = robots::simulated_scene(text)?;
+    let scene = robots::simulated_scene(text, &task.workcell.obstacles)?;
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(task.camera.intrinsics),
         camera_pose: Some(task.camera.pose),
@@ -240,7 +241,7 @@ fn dry_run<A: Arm>(
         eprintln!("no motion is drawn: {missing}");
         return Ok(());
     }
-    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell.obstacles)? {
+    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

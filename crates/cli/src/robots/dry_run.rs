@@ -29,7 +29,7 @@ pub(crate) fn draw_dry_run(
     _plan: &DryRun,
     _folder: &std::path::Path,
     _seen: Option<&sdg_cell::SeenOutline>,
-    _obstacles: &[sdg_kinematics::collision::Obstacle],
+    _workcell: &sdg_robot::workcell::Workcell,
 ) -> Result<Vec<std::path::PathBuf>> {
     eprintln!("this sdg was built without the simulator and draws no motion");
     Ok(Vec::new())

@@ -95,9 +95,11 @@ impl DemonstrationFolder {
             let text = String::from_utf8(sdg_files::read(&symmetries, MAX_SYMMETRIES_BYTES)?)
                 .with_context(|| symmetries.display().to_string())?;
             for line in text.lines().filter(|line| !line.trim().is_empty()) {
+                // A name can contain spaces, a symmetry cannot.
                 let named = line
-                    .split_once(char::is_whitespace)
-                    .and_then(|(name, times)| Some((found.get_mut(name)?, symmetry(times.trim()).ok()?)));
+                    .trim()
+                    .rsplit_once(char::is_whitespace)
+                    .and_then(|(name, times)| Some((found.get_mut(name.trim_end())?, symmetry(times).ok()?)));
                 let Some((part, times)) = named else {
                     bail!(
                         "{}: expected a part of this folder and 1 to 360 or full, found \"{line}\"",
@@ -135,5 +137,27 @@ impl PartDemonstrations {
     pub fn sha256(&self) -> Result<Vec<String>> {
         let paths = self.files.iter().flat_map(|(photo, marks)| [photo, marks]);
         paths.map(|path| sha256_of(path).with_context(|| path.display().to_string())).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_part_whose_name_has_a_space_can_have_a_symmetry() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+        for name in ["rod end.png", "rod end.json", "key.png", "key.json"] {
+            write(name, "");
+        }
+        write(SYMMETRIES, "rod end 2\nkey\t 4 \n");
+        let fold = |text: &str| text.parse::<u32>().map(RotationalSymmetry::Fold).map_err(|_| text.to_owned());
+        let read = DemonstrationFolder::read(folder.path(), fold).unwrap();
+        let found: Vec<_> = read.parts.iter().map(|part| (part.name.as_str(), part.symmetry)).collect();
+        let [two, four] = [2, 4].map(|times| Some(RotationalSymmetry::Fold(times)));
+        assert_eq!(found, [("key", four), ("rod end", two)]);
     }
 }

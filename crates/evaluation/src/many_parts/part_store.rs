@@ -1,5 +1,7 @@
 //! Stores the results of each part: the model file, and a record of the inputs and the outcome of teaching.
 
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -110,16 +112,42 @@ impl PartStore {
         Ok((record.key == *key).then_some(record.outcome))
     }
 
-    /// Stores the outcome of a part. The record is written last, because it states that the model is complete.
+    /// Stores the outcome of a part. Without a model, an earlier model of the part is removed. The record is written
+    /// last, because it states that the model is complete.
     ///
     /// # Errors
-    /// Files cannot be written.
+    /// Files cannot be written or removed.
     pub fn write(&self, part: &str, model: Option<&[u8]>, record: &PartRecord) -> Result<()> {
-        if let Some(bytes) = model {
-            write_atomically(&self.model_file(part), bytes)?;
+        let path = self.model_file(part);
+        match model {
+            Some(bytes) => write_atomically(&path, bytes)?,
+            None => match fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    return Err(error).with_context(|| format!("{}: cannot remove", path.display()));
+                }
+                _ => {}
+            },
         }
         let mut bytes = serde_json::to_vec_pretty(record)?;
         bytes.push(b'\n');
         Ok(write_atomically(&self.record_file(part), &bytes)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_teaching_leaves_no_earlier_model() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = PartStore::open(folder.path()).unwrap();
+        let outcome = PartOutcome::Failed { why: "nothing learnt".to_owned() };
+        let record = PartRecord { key: Value::Null, outcome: outcome.clone() };
+        for model in [None, Some(&b"model"[..]), None] {
+            store.write("lever", model, &record).unwrap();
+            assert_eq!(store.model_file("lever").exists(), model.is_some());
+        }
+        assert_eq!(store.read("lever", &Value::Null).unwrap(), Some(outcome));
     }
 }

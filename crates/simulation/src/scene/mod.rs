@@ -44,6 +44,8 @@ pub struct VariationConfig {
     pub clearance_m: f64,
     /// Whether lamps, table and their colours also vary; otherwise they are nominal.
     pub appearance: bool,
+    /// Convex areas of the table for neither the object nor distractors, in metres, counter-clockwise.
+    pub taken: Vec<Vec<Point2<f64>>>,
 }
 
 impl Default for VariationConfig {
@@ -54,6 +56,7 @@ impl Default for VariationConfig {
             distractors: 0..=6,
             clearance_m: 0.006,
             appearance: true,
+            taken: Vec::new(),
         }
     }
 }
@@ -117,26 +120,27 @@ impl SceneVariation {
     /// distractors.
     pub fn sample(object: Option<&ObjectSpec>, config: &VariationConfig, seed: u64) -> Self {
         let rng = &mut Stream::Object.rng(seed);
-        let object = object.map(|spec| {
-            let (x, y) = (rng.random_range(config.object_x_m.clone()), rng.random_range(config.object_y_m.clone()));
-            let yaw = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
-            PlacedObject { spec: spec.clone(), base_from_object: spec.base_from_object(x, y, yaw) }
-        });
+        let object = object.map(|spec| sample_object(spec, config, rng));
         let (lighting, table) = if config.appearance {
             (Lighting::sample(&mut Stream::Light.rng(seed)), Table::sample(&mut Stream::Table.rng(seed)))
         } else {
             (Lighting::nominal(), Table::nominal())
         };
-        let taken =
-            object.iter().flat_map(|object| [object.footprint(), object.gripper_footprint()]).collect::<Vec<_>>();
+        let of_object = object.iter().flat_map(|object| [object.footprint(), object.gripper_footprint()]);
+        let taken = config.taken.iter().cloned().chain(of_object).collect();
         let distractors = sample_distractors(taken, config, &mut Stream::Distractors.rng(seed));
         Self { object, instances: Vec::new(), lighting, table, distractors }
     }
 
     /// The scene as MJCF sections and their files.
     pub fn fragment(&self) -> MjcfFragment {
+        self.fragment_on_table(0.0)
+    }
+
+    /// As [`Self::fragment`], with the table's top at another z (m). The objects stay where they are.
+    pub(crate) fn fragment_on_table(&self, table_height_m: f64) -> MjcfFragment {
         let mut fragment = self.lighting.fragment();
-        fragment.append(self.table.fragment());
+        fragment.append(self.table.fragment(table_height_m));
         if let Some(object) = &self.object {
             fragment.append(object.spec.fragment(&object.base_from_object));
         }
@@ -173,6 +177,9 @@ impl PlacedObject {
 /// Outline of two fingers, opened to 0.08 m, with their thickness: x along the marks, y along the jaws' motion.
 const GRIPPER_FOOTPRINT: [[f64; 2]; 4] = [[-0.016, -0.062], [0.016, -0.062], [0.016, 0.062], [-0.016, 0.062]];
 
+/// Number of poses that are tried for the object.
+const OBJECT_TRIES: usize = 200;
+
 /// Number of poses that are tried for a distractor before it is left out.
 const PLACEMENT_TRIES: usize = 40;
 
@@ -193,6 +200,28 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
     let config =
         VariationConfig { object_x_m: ordered(config.object_x_m), object_y_m: ordered(config.object_y_m), ..config };
     sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
+}
+
+/// The object at a random pose, at a distance from the areas in `config.taken`. If none of [`OBJECT_TRIES`] poses has
+/// this distance, the last one is used.
+fn sample_object(spec: &ObjectSpec, config: &VariationConfig, rng: &mut Pcg64Mcg) -> PlacedObject {
+    let mut draw = || {
+        let (x, y) = (rng.random_range(config.object_x_m.clone()), rng.random_range(config.object_y_m.clone()));
+        let yaw = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
+        PlacedObject { spec: spec.clone(), base_from_object: spec.base_from_object(x, y, yaw) }
+    };
+    let is_apart = |object: &PlacedObject| {
+        let outline = object.footprint();
+        config.taken.iter().all(|area| footprint::separation(&outline, area) >= config.clearance_m)
+    };
+    let mut object = draw();
+    for _ in 1..OBJECT_TRIES {
+        if is_apart(&object) {
+            break;
+        }
+        object = draw();
+    }
+    object
 }
 
 /// Distractors at random poses, at a distance from each other and from the areas in `taken`.
@@ -266,5 +295,26 @@ mod tests {
         }
         let wanted = 8 * 6 * ObjectSpec::names().count();
         assert!(placed >= wanted * 5 / 6, "{placed} of {wanted}");
+    }
+
+    #[test]
+    fn nothing_is_placed_in_taken_areas_and_free_parts_stay() {
+        // Half of the object's range.
+        let area = [[0.3, 0.0], [0.8, 0.0], [0.8, 0.5], [0.3, 0.5]].map(Point2::from).to_vec();
+        let usual = VariationConfig { distractors: 0..=2, ..VariationConfig::default() };
+        let config = VariationConfig { taken: vec![area.clone()], ..usual.clone() };
+        let is_apart = |outline: &[Point2<f64>]| footprint::separation(outline, &area) >= config.clearance_m;
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        let mut num_moved = 0;
+        for seed in 0..200 {
+            let scene = SceneVariation::sample(Some(&spec), &config, seed);
+            let object = scene.object.unwrap();
+            assert!(is_apart(&object.footprint()), "{seed}");
+            assert!(scene.distractors.iter().all(|distractor| is_apart(&distractor.footprint)), "{seed}");
+            let first = SceneVariation::sample(Some(&spec), &usual, seed).object.unwrap();
+            num_moved += usize::from(first != object);
+            assert_eq!(first == object, is_apart(&first.footprint()), "{seed}");
+        }
+        assert!(num_moved > 80, "{num_moved}");
     }
 }

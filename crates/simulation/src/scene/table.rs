@@ -1,4 +1,4 @@
-//! The table, whose top is the plane z = 0 of the base frame, with one of several surfaces.
+//! The table, with one of several surfaces. Its top is the plane z = 0 of the base frame, except in drawings of plans.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -162,7 +162,8 @@ impl Table {
         }
     }
 
-    pub(super) fn fragment(&self) -> MjcfFragment {
+    /// The table with its top at a height (m), and a pedestal below the robot if the robot is higher.
+    pub(super) fn fragment(&self, height_m: f64) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();
         fragment.add_texture("table_top", &self.texture());
         let (specular, shininess) = match self.surface {
@@ -173,10 +174,18 @@ impl Table {
         fragment.write(format_args!(
             "<asset><material name=\"table_top\" texture=\"table_top\" texuniform=\"true\" texrepeat=\"{r} {r}\" \
              specular=\"{specular}\" shininess=\"{shininess}\"/></asset>\n\
-             <worldbody><geom name=\"table\" type=\"plane\" pos=\"0.4 0 0\" size=\"0.8 0.9 0.01\" material=\"table_top\" \
-             friction=\"0.6 0.005 0.0002\"/></worldbody>",
+             <worldbody><geom name=\"table\" type=\"plane\" pos=\"0.4 0 {height_m}\" size=\"0.8 0.9 0.01\" \
+             material=\"table_top\" friction=\"0.6 0.005 0.0002\"/></worldbody>",
             r = 1.0 / METRES_PER_REPEAT
         ));
+        if height_m < 0.0 {
+            let middle_m = 0.5 * height_m;
+            fragment.write(format_args!(
+                "<worldbody><geom name=\"pedestal\" type=\"box\" pos=\"-0.04 0 {middle_m}\" size=\"0.12 0.1 {half_m}\" \
+                 rgba=\"0.3 0.31 0.32 1\" contype=\"0\" conaffinity=\"0\" group=\"1\"/></worldbody>",
+                half_m = -middle_m
+            ));
+        }
         fragment
     }
 }

@@ -1,6 +1,6 @@
 //! The configuration of a camera above the table, and its text form in an address.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
 
 use sdg_robot::LOOK_HEIGHT_M;
@@ -70,11 +70,11 @@ impl TableCameraConfig {
             "speed" => self.speed_m_s = number("speed", "0 to 2000 mm/s", value, 0.0..=2000.0)? * 1e-3,
             "turn" => self.turn_rad_s = number("turn", "0 to 720 degrees a second", value, 0.0..=720.0)?.to_radians(),
             "fps" => self.fps = number("fps", "1 to 1000 frames a second", value, 1.0..=1000.0)?,
-            "seed" => self.seed = whole("seed", value, u64::MAX)?,
+            "seed" => self.seed = whole("seed", value, 0..=u64::MAX)?,
             "seconds" => self.duration_secs = Some(number("seconds", "0 to 1000000", value, 0.0..=1e6)?),
-            "count" => self.count = (whole("count", value, 4)? as usize).max(1),
+            "count" => self.count = whole("count", value, 1..=4)? as usize,
             "beside" => self.beside = Some(value.to_owned()),
-            "things" => self.num_things = whole("things", value, 12)? as usize,
+            "things" => self.num_things = whole("things", value, 0..=12)? as usize,
             "hide" => self.hidden_secs = Some(span("hide", value)?),
             "cover" => self.covered_secs = Some(span("cover", value)?),
             "noise" => self.noise = number("noise", "0 to 40 grey values", value, 0.0..=40.0)?,
@@ -136,20 +136,21 @@ fn wrong(field: &'static str, expected: &str, found: &str) -> SimulationError {
     SimulationError::Configuration { field, expected: expected.to_owned(), found: format!("\"{found}\"") }
 }
 
-fn number(field: &'static str, expected: &str, text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64> {
+fn number(field: &'static str, expected: &str, text: &str, range: RangeInclusive<f64>) -> Result<f64> {
     text.parse().ok().filter(|value| range.contains(value)).ok_or_else(|| wrong(field, expected, text))
 }
 
-fn whole(field: &'static str, text: &str, most: u64) -> Result<u64> {
-    let value = text.parse().ok().filter(|value| *value <= most);
-    value.ok_or_else(|| wrong(field, &format!("a whole number from 0 to {most}"), text))
+fn whole(field: &'static str, text: &str, range: RangeInclusive<u64>) -> Result<u64> {
+    let value = text.parse::<u64>().ok().filter(|value| range.contains(value));
+    value.ok_or_else(|| wrong(field, &format!("a whole number from {} to {}", range.start(), range.end()), text))
 }
 
 fn span(field: &'static str, text: &str) -> Result<Range<f64>> {
-    const EXPECTED: &str = "seconds from..to, as 2..3";
+    const EXPECTED: &str = "seconds from..to, the first less than the second, as 2..3";
     let (from, to) = text.split_once("..").ok_or_else(|| wrong(field, EXPECTED, text))?;
     let [from, to] = [from, to].map(|end| number(field, EXPECTED, end, 0.0..=1e6));
-    Ok(from?..to?)
+    let span = from?..to?;
+    if span.is_empty() { Err(wrong(field, EXPECTED, text)) } else { Ok(span) }
 }
 
 #[cfg(test)]
@@ -173,5 +174,13 @@ mod tests {
         assert!(message("key?sped=3").contains("sped") && message("key?sped=3").contains("speed"));
         assert!(message("key?fps=0").contains("1 to 1000"), "{}", message("key?fps=0"));
         assert!(message("key?hide=3").contains("2..3"), "{}", message("key?hide=3"));
+        for count in ["count=0", "count=5"] {
+            let message = message(&format!("key?{count}"));
+            assert!(message.contains("from 1 to 4"), "{message}");
+        }
+        for interval in ["hide=3..2", "cover=2..2"] {
+            let message = message(&format!("key?{interval}"));
+            assert!(message.contains("the first less than the second"), "{message}");
+        }
     }
 }

@@ -25,6 +25,9 @@ pub struct WorkcellConfig {
     pub camera_pose: Option<CameraPose>,
     /// Obstacles in the cell besides the table.
     pub obstacles: Vec<Obstacle>,
+    /// The table's z in the base frame, in metres, for drawings of plans. The objects of the scene, and the judgement of
+    /// attempts, are for a table at 0.
+    pub table_height_m: f64,
 }
 
 impl WorkcellConfig {
@@ -38,6 +41,7 @@ impl WorkcellConfig {
             seen_part: None,
             camera_pose: None,
             obstacles: Vec::new(),
+            table_height_m: 0.0,
         }
     }
 }

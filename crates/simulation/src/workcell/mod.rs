@@ -15,7 +15,8 @@ use crate::error::{Result, SimulationError};
 use crate::extent::lowest_point_m;
 use crate::gripper::Gripper;
 use crate::lens::Frustum;
-use crate::model::{Body, Camera, Id};
+use crate::model::{Body, Camera, Geom, Id};
+use crate::obstacles::obstacle_of_geom;
 use crate::panda::PandaIds;
 use crate::record::Recorder;
 use crate::render::Renderer;
@@ -234,20 +235,24 @@ impl Workcell {
     /// Describes which bodies of the arm touch which objects.
     pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
-        // The table is a geom of MuJoCo's body "world".
-        let name_of = |body: Id<Body>| match model.name(body) {
-            Some(name) if name != "world" => name,
-            _ => "the table".into(),
+        let body_of = |geom: Id<Geom>| model.name(model.body_of(geom)).unwrap_or_default();
+        let name_of = |geom: Id<Geom>| match body_of(geom).as_str() {
+            // The table and the obstacles are geoms of MuJoCo's body "world".
+            "" | "world" => match model.name(geom).as_deref() {
+                None | Some("table") => "the table".to_owned(),
+                Some(name) => obstacle_of_geom(name).to_owned(),
+            },
+            body => body.to_owned(),
         };
         let mut touching: Vec<String> = self
             .data
             .contacts()
-            .map(|contact| {
-                let (one, other) = (model.body_of(contact.geom1), model.body_of(contact.geom2));
-                (name_of(one), name_of(other))
+            .map(|contact| [contact.geom1, contact.geom2])
+            .filter_map(|[one, other]| match (is_arm(&body_of(one)), is_arm(&body_of(other))) {
+                (true, false) => Some(format!("{} on {}", name_of(one), name_of(other))),
+                (false, true) => Some(format!("{} on {}", name_of(other), name_of(one))),
+                _ => None,
             })
-            .filter(|(one, other)| is_arm(one) != is_arm(other))
-            .map(|(one, other)| if is_arm(&one) { format!("{one} on {other}") } else { format!("{other} on {one}") })
             .collect();
         touching.sort();
         touching.dedup();

@@ -18,9 +18,12 @@ use super::config::WorkcellConfig;
 /// Name of a camera beside the robot.
 pub(crate) const CAMERA_IN_BASE: &str = "beside";
 
+/// Distance of the floor below the table, in metres.
+const FLOOR_BELOW_TABLE_M: f64 = 0.75;
+
 /// Builds MuJoCo's model of the robot, the table and the objects on it, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
-    let mut fragment = config.scene.fragment();
+    let mut fragment = config.scene.fragment_on_table(config.table_height_m);
     if let Some(seen) = &config.seen_part {
         fragment.append(seen.fragment());
     }
@@ -49,6 +52,7 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
     };
     let xml = include_str!("../../assets/workcell.xml")
         .replace("PANDA_FILE", PANDA_FILE)
+        .replace("FLOOR_Z_M", &(config.table_height_m - FLOOR_BELOW_TABLE_M).to_string())
         .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + &obstacles + sections));
     let mut assets = fragment.files;
     assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, RehearsedPlace};
 use sdg_evaluation::run_page::{self, RunPage};
 use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes, attempt_in_words, run_json};
@@ -18,6 +18,7 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::parts::part_named;
+use crate::robots;
 use crate::shared_args::OwnPartArgs;
 
 /// Runs the attempts and writes the report; after Ctrl-C, the report of the attempts so far.
@@ -113,10 +114,7 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
 /// A place in the workcell file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
-    if workcell.table_height_m != 0.0 {
-        let found_mm = workcell.table_height_m * 1e3;
-        bail!("{}: height_mm: expected 0, the table's height in rehearsals, found {found_mm}", path.display());
-    }
+    robots::check_table_height(&workcell, path)?;
     Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 

@@ -38,6 +38,7 @@ pub use settings::{AttemptSettings, AxisSettings};
 pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
 };
+pub(super) use summary::instances_in_picture;
 pub use tables::{markdown, tables};
 pub use units::{AxesEvaluation, GRASPING_MODELS};
 pub use way::Way;

@@ -243,6 +243,11 @@ fn records<'o>(
     Ok(records)
 }
 
+/// Number of instances of the part in each picture of an axis, except for look-alikes.
+pub(in crate::simulated) fn instances_in_picture(axis: Axis) -> usize {
+    if axis == Axis::Instances { 3 } else { 1 }
+}
+
 /// The results of a model along an axis. Without a model, every instance counts as missed.
 fn axis_figures(
     axis: Axis,
@@ -251,7 +256,7 @@ fn axis_figures(
     records: &[(&str, Option<AxisRecord>)],
     axis_views: usize,
 ) -> AxisFigures {
-    let instances_each = if axis == Axis::Instances { 3 } else { 1 };
+    let instances_each = instances_in_picture(axis);
     let part = |(object, record): &(&str, Option<AxisRecord>)| PartShare {
         object: (*object).to_owned(),
         share: match record {

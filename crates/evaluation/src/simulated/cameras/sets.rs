@@ -6,7 +6,7 @@ use sdg_simulation::CameraView;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::views::{Axis, OTHER_CAMERAS, OnTable, other_view};
 
-use crate::simulated::axes::draw;
+use crate::simulated::axes::{draw, instances_in_picture};
 
 /// Sizes of parts that must be refused, in percent of the taught part's size.
 const OTHER_SIZES_PERCENT: [u32; 4] = [80, 90, 110, 125];
@@ -44,6 +44,15 @@ impl PictureSet {
             Self::Camera(idx) => OTHER_CAMERAS[idx].name,
             Self::Axis(axis) => axis.name(),
             Self::OtherSizes => "other-sizes",
+        }
+    }
+
+    /// Number of instances of the part in each picture.
+    pub(super) fn num_instances(self) -> usize {
+        match self {
+            Self::Camera(_) => 1,
+            Self::Axis(axis) => instances_in_picture(axis),
+            Self::OtherSizes => 0,
         }
     }
 

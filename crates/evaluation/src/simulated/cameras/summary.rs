@@ -38,9 +38,9 @@ pub struct SetFigures {
     pub model: ModelKind,
     pub set: &'static str,
     pub parts: String,
-    /// Instances found, of all in the pictures.
+    /// Instances found, of all in the pictures. Without a model, every instance counts as missed.
     pub found: Share,
-    /// Pictures without the part in which a detection was accepted, of all without the part.
+    /// Pictures without the part in which a detection was accepted, of all without the part that a model searched.
     pub accepted: Share,
     /// Number of accepted detections that found no instance, in pictures with the part.
     pub wrong: usize,
@@ -73,6 +73,8 @@ struct Shown<'a> {
     model: ModelKind,
     set: PictureSet,
     pictures: Vec<CameraPicture>,
+    /// Number of instances in pictures that were not searched, because teaching gave no model.
+    num_missed: usize,
 }
 
 impl CamerasSummary {
@@ -87,15 +89,24 @@ impl CamerasSummary {
             for object in evaluation.objects {
                 for &set in evaluation.sets {
                     let cell = Cell { model, object: &object.name };
-                    let Some(record) = evaluation.record(cell, set)? else { continue };
-                    seconds += record.seconds;
+                    let (mut pictures, mut num_missed) = (Vec::new(), 0);
+                    if evaluation.is_without_model(cell)? {
+                        num_missed = evaluation.views as usize * set.num_instances();
+                    } else if let Some(record) = evaluation.record(cell, set)? {
+                        seconds += record.seconds;
+                        pictures = record.pictures;
+                    }
+                    if pictures.is_empty() && num_missed == 0 {
+                        continue;
+                    }
                     shown.push(Shown {
                         object: &object.name,
                         is_high: object.mark_height_m > HIGH_M,
                         has_turn: object.symmetry != sdg_geometry::RotationalSymmetry::Full,
                         model,
                         set,
-                        pictures: record.pictures,
+                        pictures,
+                        num_missed,
                     });
                 }
             }
@@ -129,7 +140,8 @@ fn figures(model: ModelKind, set: &'static str, parts: &str, shown: &[&Shown]) -
         let chosen = shown.iter().filter(move |shown| has_turn.is_none_or(|has| shown.has_turn == has));
         chosen.flat_map(|shown| &shown.pictures).flat_map(|picture| &picture.answers).filter(|a| a.found.is_some())
     };
-    let instances = pictures().map(|picture| picture.instances).sum();
+    let num_missed: usize = shown.iter().map(|shown| shown.num_missed).sum();
+    let instances = num_missed + pictures().map(|picture| picture.instances).sum::<usize>();
     let without = || pictures().filter(|picture| picture.instances == 0);
     SetFigures {
         model,
@@ -159,4 +171,40 @@ fn errors(found: Vec<&MetricAnswer>, with_turn: Vec<&MetricAnswer>) -> Option<Er
             answer.error_deg.is_some_and(|error| error <= answer.sigma_deg)
         }),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_grasp::Preset;
+    use sdg_simulation::objects::ObjectSpec;
+    use sdg_simulation::views::Axis;
+
+    use super::*;
+    use crate::Settings;
+    use crate::simulated::records::TeachingRecord;
+    use crate::simulated::store::Store;
+
+    #[test]
+    fn a_part_whose_teaching_failed_counts_as_missed() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
+        let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
+        store.write_made_with("cells/C-key.teaching-plan-view.json", &store.settings().teaching(), &failed).unwrap();
+        let evaluation = CamerasEvaluation {
+            models: &[ModelKind::C],
+            objects: &[ObjectSpec::by_name("key").unwrap()],
+            sets: &[PictureSet::Camera(0), PictureSet::Axis(Axis::Instances), PictureSet::OtherSizes],
+            preset: Preset::Edge,
+            store: &store,
+            views: 4,
+            photos: 1,
+            jobs: 1,
+        };
+        let summary = CamerasSummary::collect(&evaluation).unwrap();
+        let found = |rows: &[SetFigures]| rows.iter().map(|row| row.found).collect::<Vec<_>>();
+        // Parts of other sizes must not be found: without a model, there is nothing to count.
+        assert_eq!(found(&summary.sets), [4, 12].map(|of| Share { count: 0, of }));
+        assert_eq!(found(&summary.by_part), [Share { count: 0, of: 4 }]);
+        assert_eq!(summary.remaining, 0);
+    }
 }
