@@ -1,8 +1,8 @@
 //! Plans a grasp from the arm's current posture, with the real sequence and limits, without moving the arm.
 
 use sdg_robot::{
-    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, KnownTarget, PlaceGoal, PlacingConfig,
-    PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
+    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, HandState, KnownTarget, PlaceGoal,
+    PlacingConfig, PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
 };
 
 use crate::sequence_run::{Ended, run_sequence};
@@ -21,21 +21,22 @@ pub struct DryRun {
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of the arm. `target` is the part's pose, if the part is visible in this state.
+    /// Plans the sequence from a state of arm and hand. `target` is the part's pose, if the part is visible there.
     ///
     /// # Errors
     /// A setting of the sequence is invalid, or the place has no room for the part. A motion that violates a limit is
     /// not an error, but is returned in [`Self::failed`].
     pub fn plan(
         start: ArmState,
-        opening_m: f64,
+        hand: HandState,
         target: Option<GraspTarget>,
         limits: SafetyLimits,
         camera: CameraPose,
         config: &GraspConfig,
         place: Option<&(PlaceGoal, PlacingConfig)>,
     ) -> Result<Self> {
-        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m);
+        let opening_m = hand.opening_m;
+        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m).with_hand(hand);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let mut finder = KnownTarget::new(target, camera, config);
         let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, camera, config, place)?;

@@ -102,7 +102,7 @@ impl GraspTask {
     /// The arm's state cannot be read; the errors of [`DryRun::plan`].
     pub fn plan<A: Arm>(&self, arm: &mut A, limits: SafetyLimits, target: Option<GraspTarget>) -> Result<DryRun> {
         let (state, hand) = (arm.state()?, arm.hand()?);
-        DryRun::plan(state, hand.opening_m, target, limits, self.camera.pose, &self.config, self.place.as_ref())
+        DryRun::plan(state, hand, target, limits, self.camera.pose, &self.config, self.place.as_ref())
     }
 
     /// Grasps the part and, if there is a place, puts it there.

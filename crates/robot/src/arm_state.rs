@@ -92,6 +92,8 @@ pub enum HandCommand {
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
+/// Largest change of the fingers' opening since they closed, m; a larger one means that the part is lost or released.
+pub const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
 /// The load of the hand, for the controller's gravity compensation.
 #[derive(Debug, Clone, Copy, PartialEq)]

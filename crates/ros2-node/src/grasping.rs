@@ -202,7 +202,7 @@ fn planned(
         Ok(_) => return refused("the part was not found".to_owned()),
         Err(error) => return refused(error.to_string()),
     };
-    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m);
+    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m).with_hand(hand);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
     let camera_pose = settings.camera.pose;

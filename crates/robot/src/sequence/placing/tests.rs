@@ -213,6 +213,16 @@ fn where_nothing_is_felt_the_part_stays_in_the_hand() {
 }
 
 #[test]
+fn a_hand_that_holds_a_part_at_the_beginning_keeps_it() {
+    let mut cell = cell(Isometry3::identity());
+    cell.arm = cell.arm.with_hand(HandState { opening_m: 0.02, is_grasping: true, force_n: None });
+    let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("still holds an object"), "{why}");
+    assert!(cell.arm.actions().is_empty());
+}
+
+#[test]
 fn a_place_out_of_reach_is_said_before_the_part_is_carried() {
     let mut cell = cell(Isometry3::identity());
     let far = Place { at_m: [0.9, -0.6], ..tray() };
