@@ -317,10 +317,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
                 (CameraPose::InBase(_), _) => break,
             };
-            match arrived {
-                Err(stop) if look == 0 || self.robot.latched().is_some() => return Err(stop),
-                Err(_) => continue,
-                Ok(()) => {}
+            if !self.has_arrived(arrived, look == 0)? {
+                continue;
             }
             let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
             self.note_others();

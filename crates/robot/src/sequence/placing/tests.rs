@@ -1,12 +1,13 @@
 use super::*;
-use crate::arm_state::{ArmState, ContactSensitivity, HandState, MotionEnd};
+use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandState, MotionEnd};
+use crate::error::RobotError;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::safety::{CheckedMotion, SafetyLimits};
-use crate::sequence::LookOut;
-use crate::watch::Watch;
+use crate::sequence::{LookOut, grasp};
+use crate::watch::{StopReason, Watch};
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, ready_pose};
 
@@ -19,6 +20,7 @@ struct Cell {
     tcp_from_part: Option<Isometry3<f64>>,
     loads_kg: Vec<f64>,
     touches: bool,
+    mode: ArmMode,
 }
 
 impl Cell {
@@ -33,7 +35,7 @@ impl Arm for Cell {
     }
 
     fn state(&mut self) -> Result<ArmState> {
-        self.arm.state()
+        Ok(ArmState { mode: self.mode, ..self.arm.state()? })
     }
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
         self.arm.follow(motion, watch)
@@ -104,6 +106,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         tcp_from_part: None,
         loads_kg: Vec::new(),
         touches: true,
+        mode: ArmMode::Idle,
     }
 }
 
@@ -146,6 +149,25 @@ fn a_part_lies_where_it_was_to_lie() {
         // The load is set while the part is held, and reset afterwards.
         assert_eq!(cell.loads_kg, [0.3, 0.0]);
     }
+}
+
+/// Finds nothing; a person presses the stop button during the first picture.
+struct Stopped;
+
+impl PartFinder<Cell> for Stopped {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        cell.mode = ArmMode::UserStopped;
+        Ok(None)
+    }
+}
+
+#[test]
+fn a_stop_between_two_pictures_ends_the_sequence() {
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose()); 2], ..config() };
+    let ended = grasp(&mut robot, &mut Stopped, &mut (), CameraPose::InBase(Isometry3::identity()), &config);
+    assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
 }
 
 /// Records the steps that begin.
