@@ -38,7 +38,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.begin(GraspStep::Approach)?;
-        self.check_age()?;
         let limits = self.robot.limits();
         let lowest =
             self.surface_height_m().max(limits.table_height_m) + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
@@ -60,6 +59,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     continue;
                 }
             };
+            // Planning around obstacles may take a second.
+            self.check_age()?;
             self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
             return match reach {
                 Reach::Around(way) => self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),

@@ -10,6 +10,7 @@ use crate::sequence::{LookOut, grasp};
 use crate::watch::{StopReason, Watch};
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, ready_pose};
+use std::time::{Duration, Instant};
 
 /// A planned arm with a part that slides by `slide`, in the part's frame, when the hand closes on it, and stays where
 /// it is released.
@@ -21,6 +22,8 @@ struct Cell {
     loads_kg: Vec<f64>,
     touches: bool,
     mode: ArmMode,
+    /// Time until the arm returns a state.
+    delay: Duration,
 }
 
 impl Cell {
@@ -35,6 +38,7 @@ impl Arm for Cell {
     }
 
     fn state(&mut self) -> Result<ArmState> {
+        std::thread::sleep(self.delay);
         Ok(ArmState { mode: self.mode, ..self.arm.state()? })
     }
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
@@ -107,6 +111,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         loads_kg: Vec::new(),
         touches: true,
         mode: ArmMode::Idle,
+        delay: Duration::ZERO,
     }
 }
 
@@ -168,6 +173,34 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose()); 2], ..config() };
     let ended = grasp(&mut robot, &mut Stopped, &mut (), CameraPose::InBase(Isometry3::identity()), &config);
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
+}
+
+/// Finds the part; planning with this picture takes longer than [`MAX_AGE`].
+struct SlowlyPlanned(Option<Instant>);
+
+const MAX_AGE: Duration = Duration::from_millis(50);
+
+impl PartFinder<Cell> for SlowlyPlanned {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(10));
+        Truth.find(cell)
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        self.0
+    }
+}
+
+#[test]
+fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), ..config() };
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let report = grasp(&mut robot, &mut SlowlyPlanned(None), &mut (), camera, &config).unwrap();
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.starts_with("the detection is "), "{why}");
+    assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
 }
 
 /// Records the steps that begin.
