@@ -245,6 +245,16 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
 }
 
 #[test]
+fn a_part_that_slides_is_taken_again_from_a_raised_place() {
+    let mut cell = cell(planar(0.005, 0.001, 0.08));
+    let goal = Place { surface_m: 0.03, ..tray() }.goal(2).unwrap();
+    let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 2);
+    assert!((cell.base_from_part.translation.z - 0.05).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
 fn turns_that_cannot_be_seen_do_not_count() {
     let mut cell = cell(Isometry3::identity());
     let place = Place { yaw_rad: 0.4 + std::f64::consts::PI - 0.2, ..tray() };
