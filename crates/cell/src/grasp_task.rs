@@ -54,6 +54,7 @@ impl GraspTask {
         let camera = camera.with_marks_at(&model, settings.told.as_ref());
         let config = GraspConfig {
             height: height_measurement(&model, &camera, settings.told),
+            surface_m: camera.assumed_surface_m(),
             pace: settings.pace,
             max_detection_age_secs: settings.max_detection_age_secs,
             soft_approach: settings.is_soft.then(TouchDown::default),

@@ -108,6 +108,7 @@ impl Grasping {
         let camera = self.settings.camera.with_marks_at(model, self.settings.told.as_ref());
         let config = GraspConfig {
             height: height_measurement(model, &camera, self.settings.told),
+            surface_m: camera.assumed_surface_m(),
             pace,
             max_detection_age_secs: 1.0,
             part: part_shape(model),

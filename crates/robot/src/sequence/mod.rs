@@ -217,7 +217,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             picture_time: None,
             closed: None,
             held: None,
-            surface_m: None,
+            surface_m: config.surface_m,
             lying: LyingParts::new(&config.lying),
             opening_m: robot.geometry().hand.opening_max_m,
             opening_margin_m: config.opening_margin_m,

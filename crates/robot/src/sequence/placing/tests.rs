@@ -255,6 +255,16 @@ fn a_part_that_slides_is_taken_again_from_a_raised_place() {
 }
 
 #[test]
+fn a_part_on_a_raised_surface_is_put_down_onto_a_lower_one() {
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.04;
+    let config = GraspConfig { surface_m: Some(0.02), ..config() };
+    let report = run(&mut cell, &config, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
 fn turns_that_cannot_be_seen_do_not_count() {
     let mut cell = cell(Isometry3::identity());
     let place = Place { yaw_rad: 0.4 + std::f64::consts::PI - 0.2, ..tray() };
