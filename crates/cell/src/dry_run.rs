@@ -5,7 +5,7 @@ use sdg_robot::{
     PlacingConfig, PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
 };
 
-use crate::sequence_run::{Ended, run_sequence};
+use crate::sequence_run::run_sequence;
 
 /// A planned grasp that is not executed.
 #[derive(Debug)]
@@ -18,6 +18,8 @@ pub struct DryRun {
     pub arm: PlannedArm,
     /// The step that cannot be planned, and the reason.
     pub failed: Option<(GraspStep, String)>,
+    /// Whether the plan ended at a look-out pose because the part is not visible; see [`crate::Ended::found_nothing`].
+    pub found_nothing: bool,
 }
 
 impl DryRun {
@@ -39,8 +41,9 @@ impl DryRun {
         let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m).with_hand(hand);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let mut finder = KnownTarget::new(target, camera, config);
-        let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, camera, config, place)?;
-        Ok(Self { start, opening_m, arm, failed })
+        let ended = run_sequence(&mut robot, &mut finder, camera, config, place)?;
+        let found_nothing = ended.found_nothing();
+        Ok(Self { start, opening_m, arm, failed: ended.failed, found_nothing })
     }
 
     /// A line for each motion of arm and hand.
