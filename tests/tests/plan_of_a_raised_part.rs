@@ -1,15 +1,17 @@
-//! The search of a dry run with a camera on the hand, for a part that lies higher than the table.
+//! Searches with a camera on the hand for a part that lies higher than the table: that of a dry run, and that after
+//! placing.
 
 use std::cell::Cell;
 
 use sdg_cell::{CameraPose, ModelFinder, MountedCamera, Pictures, TakenPicture, UNKNOWN_HEIGHTS_M};
 use sdg_evaluation::SimulatedPictures;
 use sdg_geometry::PinholeCamera;
+use sdg_grasp::GraspModel;
 use sdg_robot::height::GivenHeight;
-use sdg_robot::{Arm, GraspConfig, GraspTarget};
+use sdg_robot::{Arm, GraspConfig, GraspTarget, PartFinder};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
-use sdg_simulation::{Workcell, WorkcellConfig};
+use sdg_simulation::{Workcell, WorkcellConfig, marked_grasp};
 
 use crate::calibrated_camera::taught;
 
@@ -27,10 +29,9 @@ impl Pictures<Workcell> for Counted<'_> {
     }
 }
 
-#[test]
-fn a_given_height_of_the_marks_is_where_a_dry_run_searches_first() {
+/// A model of the pendulum, a pendulum in the air below the wrist camera, and this camera.
+fn raised() -> (GraspModel, Workcell, MountedCamera) {
     let part = ObjectSpec::by_name("pendulum").unwrap();
-    let model = taught(&part, &[]);
     let mut scene = SceneVariation::sample(Some(&part), &VariationConfig::default(), 7300);
     scene.distractors.clear();
     // The arm does not move, so that the part stays in the air.
@@ -44,6 +45,13 @@ fn a_given_height_of_the_marks_is_where_a_dry_run_searches_first() {
         pose: CameraPose::OnFlange(cell.told_flange_from_camera()),
         table_height_m: 0.0,
     };
+    (taught(&part, &[]), cell, camera)
+}
+
+#[test]
+fn a_given_height_of_the_marks_is_where_a_dry_run_searches_first() {
+    let part = ObjectSpec::by_name("pendulum").unwrap();
+    let (model, mut cell, camera) = raised();
     let told = GivenHeight { height_m: RAISED_M + part.mark_height_m, sigma_m: 0.002 };
     let mut planned = |told: Option<&GivenHeight>, is_searched_at_all_heights: bool| {
         let taken = Cell::new(0);
@@ -63,4 +71,16 @@ fn a_given_height_of_the_marks_is_where_a_dry_run_searches_first() {
     let (z_m, taken) = planned(None, true);
     assert!((z_m.unwrap() - expected_m).abs() < 0.010, "{z_m:?}");
     assert_eq!(taken, 2);
+}
+
+#[test]
+fn a_part_that_was_put_down_is_searched_at_the_height_of_its_place() {
+    let part = ObjectSpec::by_name("pendulum").unwrap();
+    let (model, mut cell, camera) = raised();
+    let expected = marked_grasp(&part, &cell.base_from_object().unwrap()).base_from_tcp;
+    let taken = Cell::new(0);
+    let mut finder = ModelFinder::new(model, camera, Counted(&taken));
+    let found = finder.find_nearest(&mut cell, &expected).unwrap().unwrap();
+    let apart = found.base_from_tcp.translation.vector - expected.translation.vector;
+    assert!(apart.xy().norm() < 0.005 && apart.z.abs() < 1e-6, "{apart}");
 }

@@ -1,11 +1,11 @@
 //! Plans a grasp from the arm's current posture, with the real sequence and limits, without moving the arm.
 
 use sdg_robot::{
-    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, KnownTarget, PlaceGoal, PlacingConfig,
-    PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
+    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, HandState, KnownTarget, PlaceGoal,
+    PlacingConfig, PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
 };
 
-use crate::sequence_run::{Ended, run_sequence};
+use crate::sequence_run::run_sequence;
 
 /// A planned grasp that is not executed.
 #[derive(Debug)]
@@ -18,28 +18,32 @@ pub struct DryRun {
     pub arm: PlannedArm,
     /// The step that cannot be planned, and the reason.
     pub failed: Option<(GraspStep, String)>,
+    /// Whether the plan ended at a look-out pose because the part is not visible; see [`crate::Ended::found_nothing`].
+    pub found_nothing: bool,
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of the arm. `target` is the part's pose, if the part is visible in this state.
+    /// Plans the sequence from a state of arm and hand. `target` is the part's pose, if the part is visible there.
     ///
     /// # Errors
     /// A setting of the sequence is invalid, or the place has no room for the part. A motion that violates a limit is
     /// not an error, but is returned in [`Self::failed`].
     pub fn plan(
         start: ArmState,
-        opening_m: f64,
+        hand: HandState,
         target: Option<GraspTarget>,
         limits: SafetyLimits,
         camera: CameraPose,
         config: &GraspConfig,
         place: Option<&(PlaceGoal, PlacingConfig)>,
     ) -> Result<Self> {
-        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m);
+        let opening_m = hand.opening_m;
+        let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m).with_hand(hand);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let mut finder = KnownTarget::new(target, camera, config);
-        let Ended { failed, .. } = run_sequence(&mut robot, &mut finder, camera, config, place)?;
-        Ok(Self { start, opening_m, arm, failed })
+        let ended = run_sequence(&mut robot, &mut finder, camera, config, place)?;
+        let found_nothing = ended.found_nothing();
+        Ok(Self { start, opening_m, arm, failed: ended.failed, found_nothing })
     }
 
     /// A line for each motion of arm and hand.

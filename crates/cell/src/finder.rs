@@ -205,7 +205,8 @@ impl<P> ModelFinder<P> {
     where
         P: Pictures<A>,
     {
-        let found = self.find_all(arm, higher_m)?;
+        let heights_m = self.heights_m.clone();
+        let found = self.find_all(arm, higher_m, heights_m.as_ref())?;
         let is_placed = |target: &GraspTarget| {
             let p = target.base_from_tcp.translation;
             self.places.iter().any(|place| place.covers([p.x, p.y]))
@@ -215,15 +216,19 @@ impl<P> ModelFinder<P> {
         Ok(best)
     }
 
-    /// All parts in a picture, best first. Assumes that they lie `higher_m` above the table, or at a height of the range
-    /// of [`Self::with_heights`].
-    fn find_all<A: Arm>(&mut self, arm: &mut A, higher_m: f64) -> sdg_robot::Result<Vec<GraspTarget>>
+    /// All parts in a picture, best first. Assumes that they lie `higher_m` above the table, or at one of `heights_m`
+    /// above the table if these are given.
+    fn find_all<A: Arm>(
+        &mut self,
+        arm: &mut A,
+        higher_m: f64,
+        heights_m: Option<&RangeInclusive<f64>>,
+    ) -> sdg_robot::Result<Vec<GraspTarget>>
     where
         P: Pictures<A>,
     {
         self.sights.clear();
-        let heights_m = self.heights_m.clone();
-        let sightings = self.look(arm, higher_m, heights_m.as_ref())?;
+        let sightings = self.look(arm, higher_m, heights_m)?;
         if heights_m.is_none() {
             return Ok(sightings.iter().map(|sighting| sighting.target).collect());
         }
@@ -284,6 +289,12 @@ impl<P> ModelFinder<P> {
     /// z of the marks of a part on a surface at this z, in metres.
     fn marks_z_m(&self, surface_z_m: f64) -> f64 {
         surface_z_m + self.lengths().map_or(0.0, |lengths| lengths.mark_height_m)
+    }
+
+    /// Height above the table of the surface under a part with this grasp, in metres.
+    fn higher_m(&self, base_from_tcp: &Isometry3<f64>) -> f64 {
+        let grasp_height_m = self.lengths().map_or(0.0, |lengths| lengths.grasp_height_m);
+        base_from_tcp.translation.z - grasp_height_m - self.camera.table_height_m
     }
 
     /// Converts a detection to a sighting in the plane of the marks.
@@ -374,6 +385,11 @@ impl<P> ModelFinder<P> {
     }
 }
 
+/// The heights at which a part is searched that is expected at a height, in metres.
+fn heights_around(height_m: f64) -> RangeInclusive<f64> {
+    height_m - HEIGHT_BY_SIZE_SIGMA_M..=height_m + HEIGHT_BY_SIZE_SIGMA_M
+}
+
 /// A detection as a target of the sequence.
 fn target(found: &Found) -> Option<GraspTarget> {
     let pose = found.pose?;
@@ -393,7 +409,9 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let apart_m = |target: &GraspTarget| {
             (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
         };
-        let found = self.find_all(arm, 0.0)?;
+        let higher_m = self.higher_m(base_from_tcp);
+        let heights_m = self.heights_m.is_some().then(|| heights_around(higher_m));
+        let found = self.find_all(arm, higher_m, heights_m.as_ref())?;
         let sure = found.iter().copied().filter(|target| target.score >= sdg_robot::SURE);
         let nearest = sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)));
         self.keep_others(found, nearest.as_ref());
@@ -401,11 +419,9 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
     }
 
     fn sight(&mut self, arm: &mut A, expected: &GraspTarget) -> sdg_robot::Result<Vec<Sighting>> {
-        let grasp_height_m = self.lengths().map_or(0.0, |lengths| lengths.grasp_height_m);
         let expected_at = expected.base_from_tcp.translation;
-        let higher_m = expected_at.z - grasp_height_m - self.camera.table_height_m;
-        let heights_m = higher_m - HEIGHT_BY_SIZE_SIGMA_M..=higher_m + HEIGHT_BY_SIZE_SIGMA_M;
-        let sightings = self.look(arm, higher_m, Some(&heights_m))?;
+        let higher_m = self.higher_m(&expected.base_from_tcp);
+        let sightings = self.look(arm, higher_m, Some(&heights_around(higher_m)))?;
         let is_near = |sighting: &Sighting| {
             let apart = sighting.target.base_from_tcp.translation.vector - expected_at.vector;
             sighting.target.score >= sdg_robot::MIN_CONFIRMING_SCORE && apart.xy().norm() <= SAME_PART_M

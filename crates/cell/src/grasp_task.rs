@@ -54,6 +54,7 @@ impl GraspTask {
         let camera = camera.with_marks_at(&model, settings.told.as_ref());
         let config = GraspConfig {
             height: height_measurement(&model, &camera, settings.told),
+            surface_m: camera.assumed_surface_m(),
             pace: settings.pace,
             max_detection_age_secs: settings.max_detection_age_secs,
             soft_approach: settings.is_soft.then(TouchDown::default),
@@ -102,7 +103,7 @@ impl GraspTask {
     /// The arm's state cannot be read; the errors of [`DryRun::plan`].
     pub fn plan<A: Arm>(&self, arm: &mut A, limits: SafetyLimits, target: Option<GraspTarget>) -> Result<DryRun> {
         let (state, hand) = (arm.state()?, arm.hand()?);
-        DryRun::plan(state, hand.opening_m, target, limits, self.camera.pose, &self.config, self.place.as_ref())
+        DryRun::plan(state, hand, target, limits, self.camera.pose, &self.config, self.place.as_ref())
     }
 
     /// Grasps the part and, if there is a place, puts it there.

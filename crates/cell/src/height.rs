@@ -29,4 +29,10 @@ impl MountedCamera {
             _ => self,
         }
     }
+
+    /// z of the surface under the parts (base frame, in metres) as a camera beside the robot assumes it; `None` for a
+    /// camera on the hand, which measures it.
+    pub fn assumed_surface_m(&self) -> Option<f64> {
+        matches!(self.pose, CameraPose::InBase(_)).then_some(self.table_height_m)
+    }
 }

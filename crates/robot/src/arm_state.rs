@@ -95,6 +95,8 @@ pub enum HandCommand {
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers closer together than this hold nothing, m.
 pub const MIN_HELD_WIDTH_M: f64 = 0.001;
+/// Largest change of the fingers' opening since they closed, m; a larger one means that the part is lost or released.
+pub const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
 /// The final widths, m, at which a hand holds a part, for the width and the tolerances of [`HandCommand::Grasp`].
 pub fn held_widths_m(width_m: f64, [thinner_m, wider_m]: [f64; 2]) -> RangeInclusive<f64> {

@@ -57,8 +57,8 @@ pub mod workcell;
 
 pub use arm::{Arm, CompliantArm};
 pub use arm_state::{
-    ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
-    MotionEnd, PERIOD_SECS, held_widths_m,
+    ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDTH_CHANGE_M,
+    MIN_HELD_WIDTH_M, MotionEnd, PERIOD_SECS, held_widths_m,
 };
 pub use camera_pose::CameraPose;
 pub use error::{Result, RobotError};

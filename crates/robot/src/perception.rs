@@ -18,7 +18,8 @@ pub trait PartFinder<A: Arm> {
     /// A picture that cannot be taken, and a failure of perception; the sequence is aborted with this error.
     fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
 
-    /// As [`PartFinder::find`], but of several detections it returns the nearest one to the grasp `base_from_tcp`.
+    /// As [`PartFinder::find`], but of several detections it returns the nearest one to the grasp `base_from_tcp`. The
+    /// part is expected at the height of this grasp.
     ///
     /// # Errors
     /// As for [`PartFinder::find`].

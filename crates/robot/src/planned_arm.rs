@@ -47,6 +47,11 @@ impl PlannedArm {
         }
     }
 
+    /// Starts with this state of the hand.
+    pub fn with_hand(self, hand: HandState) -> Self {
+        Self { hand, ..self }
+    }
+
     /// The recorded commands, in order.
     pub fn actions(&self) -> &[PlannedAction] {
         &self.actions

@@ -26,6 +26,10 @@ const YIELDING_M_PER_NS: f64 = 0.02;
 /// Largest speed of the reference while pressing, m/s.
 const MAX_YIELDING_M_S: f64 = 0.015;
 
+/// Smallest force at the end of pressing that confirms a contact, as a fraction of the requested force: a momentary
+/// force in free air is none.
+const MIN_PRESSED_SHARE: f64 = 0.25;
+
 /// Settings of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchDown {
@@ -89,7 +93,7 @@ impl TouchDown {
 /// The result of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched {
-    /// Whether there was a contact before the path's end.
+    /// Whether there was a contact before the path's end, and at least half of the requested force at the end.
     pub is_contact: bool,
     /// Measured height of the tcp in the base frame at the end, m.
     pub tcp_height_m: f64,
@@ -194,6 +198,8 @@ impl Descent {
             Phase::Pressing => {
                 self.peak_n = self.peak_n.max(pressed_n);
                 self.speed_m_s = match self.is_contact {
+                    // The path was checked only to its end.
+                    true if way_m >= self.touch_down.max_way_m => self.yielding(pressed_n).min(0.0),
                     true => self.yielding(pressed_n),
                     false => 0.0,
                 };
@@ -231,10 +237,11 @@ impl Descent {
     /// The result, after the last torques were sent.
     pub fn touched(&self) -> Touched {
         let num = f64::from(self.num_summed.max(1));
+        let force_n = self.force_sum_n / num;
         Touched {
-            is_contact: self.is_contact,
+            is_contact: self.is_contact && force_n >= MIN_PRESSED_SHARE * self.touch_down.press_n,
             tcp_height_m: self.height_sum_m / num,
-            force_n: self.force_sum_n / num,
+            force_n,
             peak_n: self.peak_n,
             free_air_error: self.free_air_error,
         }
@@ -254,6 +261,11 @@ mod tests {
     /// Descends with an arm that is held in place. Once the reference moves, the external force exceeds [`FREE_AIR_N`]
     /// by `pressed_n(f)` for the force `f` of the spring, both in N.
     fn descend(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Touched {
+        descended(touch_down, pressed_n).touched()
+    }
+
+    /// As [`descend`], with the state at the end.
+    fn descended(touch_down: TouchDown, pressed_n: impl Fn(f64) -> f64) -> Descent {
         let (arm, q, still) = (ArmGeometry::panda(), ready_pose(), JointVector::zeros());
         let mut descent = Descent::new(touch_down, &arm, q, still);
         for _ in 0..MAX_CYCLES {
@@ -263,7 +275,7 @@ mod tests {
                 Phase::Pressing => pressed_n(touch_down.contact.stiffness.z * descent.down_m),
             };
             if descent.next(&arm, &q, &still, FREE_AIR_N + pressed_n).1 {
-                return descent.touched();
+                return descent;
             }
         }
         panic!("it does not end");
@@ -276,6 +288,16 @@ mod tests {
             let touched = descend(touch_down, |_| pressed_n * touch_down.contact_n);
             assert_eq!(touched.is_contact, is_contact, "{pressed_n}");
         }
+    }
+
+    #[test]
+    fn a_force_that_does_not_last_is_no_contact() {
+        let at_first = |spring_n: f64| if spring_n > 0.0 { 0.0 } else { 3.1 };
+        let touched = descend(TouchDown::default(), at_first);
+        assert!(!touched.is_contact && touched.peak_n > TouchDown::default().contact_n, "{touched:?}");
+        // The arm is held at the end of the checked path: the reference stays there.
+        let ended = descended(TouchDown { max_way_m: 0.0, ..TouchDown::default() }, at_first);
+        assert!(ended.is_contact && ended.down_m <= 0.0, "{ended:?}");
     }
 
     /// The reference moves until the measured force is the requested one.

@@ -108,6 +108,7 @@ impl Grasping {
         let camera = self.settings.camera.with_marks_at(model, self.settings.told.as_ref());
         let config = GraspConfig {
             height: height_measurement(model, &camera, self.settings.told),
+            surface_m: camera.assumed_surface_m(),
             pace,
             max_detection_age_secs: 1.0,
             part: part_shape(model),
@@ -207,7 +208,7 @@ fn planned(
         Ok(_) => return refused("the part was not found".to_owned()),
         Err(error) => return refused(error.to_string()),
     };
-    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m);
+    let mut planned = PlannedArm::new(settings.workcell.robot.geometry(), state.q, hand.opening_m).with_hand(hand);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
     let camera_pose = settings.camera.pose;

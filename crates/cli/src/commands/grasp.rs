@@ -235,7 +235,7 @@ fn dry_run<A: Arm>(
 ) -> Result<()> {
     let plan = task.plan(arm, limits, target)?;
     eprintln!("planned, not executed:");
-    print_plan(&plan, target.is_some())?;
+    print_plan(&plan)?;
     #[cfg(feature = "simulation")]
     if let Err(missing) = sdg_simulation::load() {
         eprintln!("no motion is drawn: {missing}");

@@ -7,13 +7,13 @@ use sdg_cell::DryRun;
 ///
 /// # Errors
 /// A step cannot be planned.
-pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
+pub(crate) fn print_plan(plan: &DryRun) -> Result<()> {
     for line in plan.lines() {
         eprintln!("  {line}");
     }
     match &plan.failed {
         None => eprintln!("  {:.0} s in all", plan.arm.duration_secs()),
-        Some(_) if !is_seen => {
+        Some(_) if plan.found_nothing => {
             eprintln!(
                 "  the part is not visible from the arm's current posture: only the way to the look-out poses is planned"
             );
@@ -33,4 +33,34 @@ pub(crate) fn draw_dry_run(
 ) -> Result<Vec<std::path::PathBuf>> {
     eprintln!("this sdg was built without the simulator and draws no motion");
     Ok(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_kinematics::{ArmGeometry, JointVector, ready_pose};
+    use sdg_robot::{
+        ArmMode, ArmState, CameraPose, GraspConfig, HandState, LookOut, SafetyLimits, camera_looking_down,
+    };
+
+    /// The plan from a tcp at a height (m), of a part that is not visible there.
+    fn unseen_from(height_m: f64) -> DryRun {
+        let panda = ArmGeometry::panda();
+        let base_from_tcp = camera_looking_down(0.45, 0.0, height_m, std::f64::consts::FRAC_PI_2);
+        let q = panda.inverse(&base_from_tcp, &ready_pose(), &Default::default()).unwrap().q;
+        let zero = JointVector::zeros();
+        let start =
+            ArmState { time_secs: 0.0, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Idle };
+        let hand = HandState { opening_m: 0.08, is_grasping: false, force_n: None };
+        let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose())], ..GraspConfig::default() };
+        let camera = CameraPose::InBase(base_from_tcp);
+        DryRun::plan(start, hand, None, SafetyLimits::default(), camera, &config, None).unwrap()
+    }
+
+    #[test]
+    fn a_refused_motion_to_the_first_look_out_pose_is_an_error() {
+        print_plan(&unseen_from(0.30)).unwrap();
+        let error = print_plan(&unseen_from(0.02)).unwrap_err().to_string();
+        assert!(error.starts_with("detect: the path there passes "), "{error}");
+    }
 }

@@ -15,9 +15,9 @@ mod real_time;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
 use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status, Version};
+use sdg_fci::{FciError, RobotErrors};
 use sdg_kinematics::{ArmGeometry, JointVector};
 
 use crate::arm::{Arm, CompliantArm};
@@ -266,8 +266,11 @@ impl Arm for FrankaArm {
         self.robot.automatic_error_recovery().map_err(|error| self.error(error))?;
         // States from before the answer may still be on their way; the next motion must not begin with one of them.
         let deadline = Instant::now() + MAX_LATE;
-        while matches!(self.state()?.mode, ArmMode::Reflex | ArmMode::Recovering) && Instant::now() < deadline {}
-        Ok(())
+        let mut mode = self.state()?.mode;
+        while matches!(mode, ArmMode::Reflex | ArmMode::Recovering) && Instant::now() < deadline {
+            mode = self.state()?.mode;
+        }
+        check_recovered(mode, self.robot.state().reflex_reason)
     }
 }
 
@@ -275,6 +278,15 @@ impl CompliantArm for FrankaArm {
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
         self.set_contact_sensitivity(ContactSensitivity::Contact)?;
         self.in_control(|arm| arm.come_down(touch_down, watch))
+    }
+}
+
+/// Checks the mode after a recovery.
+fn check_recovered(mode: ArmMode, reflex_reason: RobotErrors) -> Result<()> {
+    match mode {
+        ArmMode::Idle | ArmMode::Moving | ArmMode::Guiding => Ok(()),
+        ArmMode::Reflex => Err(RobotError::Reflex(reflex_reason.to_string())),
+        ArmMode::UserStopped | ArmMode::Recovering => Err(RobotError::Stopped(StopReason::Mode(mode))),
     }
 }
 
@@ -329,6 +341,20 @@ mod tests {
             for torque in [behavior.upper_torque_nominal, behavior.upper_torque_acceleration] {
                 assert!(torque.iter().all(|value| *value > 0.0 && *value <= max_nm), "{sensitivity:?}: {torque:?}");
             }
+        }
+    }
+
+    #[test]
+    fn an_arm_that_remains_in_reflex_is_not_recovered() {
+        let none = RobotErrors::default();
+        assert!(check_recovered(ArmMode::Idle, none).is_ok());
+        assert!(matches!(check_recovered(ArmMode::Reflex, none), Err(RobotError::Reflex(_))));
+        for mode in [ArmMode::UserStopped, ArmMode::Recovering] {
+            let found = check_recovered(mode, none);
+            assert!(
+                matches!(found, Err(RobotError::Stopped(StopReason::Mode(in_mode))) if in_mode == mode),
+                "{found:?}"
+            );
         }
     }
 }

@@ -64,6 +64,8 @@ pub struct GraspConfig {
     /// How a camera on the hand measures the part's height; with `None`, or with a camera beside the robot, the height
     /// comes from perception.
     pub height: Option<HeightMeasurement>,
+    /// z of the surface under the part, base frame, m, if it is given and not measured; `None` for the table.
+    pub surface_m: Option<f64>,
     /// Obstacles in the cell besides the table: free motions are planned around them.
     pub obstacles: Vec<Obstacle>,
     /// Radius of the part around its grasp, m: the held part is kept away from the obstacles like the arm.
@@ -97,6 +99,7 @@ impl Default for GraspConfig {
             load: None,
             soft_approach: None,
             height: None,
+            surface_m: None,
             obstacles: Vec::new(),
             part_radius_m: 0.06,
             part: None,

@@ -9,7 +9,7 @@ use super::held_part::HeldPart;
 use super::reach::above;
 use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
-use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
+use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDTH_CHANGE_M, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
@@ -20,8 +20,6 @@ const CLOSING_SPEED_M_S: f64 = 0.1;
 const LIFT_STEP_M: f64 = 0.05;
 /// Minimum distance from the obstacles of the cell on straight motions, m.
 const LINE_MARGIN_M: f64 = 0.003;
-/// Largest change of the fingers' opening since they closed, m; a larger one means that the part is lost.
-const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Closes the hand on the part.

@@ -6,6 +6,7 @@ use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchan
 use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
 use crate::arm::Arm;
+use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::lying_part::LyingPart;
 use crate::perception::GraspStep;
@@ -28,16 +29,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let table_height_m = self.robot.limits().table_height_m;
         let mut looks = 0;
         for look_out in &config.look_outs {
-            let arrived = match look_out.configuration(self.robot.geometry(), &self.cell.camera, table_height_m) {
-                Ok(q) => self.move_freely(&q, GraspStep::Detect),
-                Err(error) => Err(Stop::Error(error)),
+            let q = match look_out.configuration(self.robot.geometry(), &self.cell.camera, table_height_m) {
+                Ok(q) => q,
+                Err(RobotError::Configuration { .. }) if looks > 0 => continue,
+                Err(error) => return Err(error.into()),
             };
-            match arrived {
-                Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
-                // An unreachable pose is skipped.
-                Err(_) => continue,
-                Ok(()) => self.robot.wait(SETTLE_SECS)?,
+            let arrived = self.move_freely(&q, GraspStep::Detect);
+            if !self.has_arrived(arrived, looks == 0)? {
+                continue;
             }
+            self.robot.wait(SETTLE_SECS)?;
             looks += 1;
             self.report.looks[0] = looks;
             if let Some(target) = self.find(|target| target.score >= SURE)? {
@@ -53,17 +54,27 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.begin(GraspStep::Hover)?;
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
-            match self.hover(&[first.base_from_tcp], shift_m, GraspStep::Hover) {
-                Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
-                Err(_) => continue,
-                Ok(()) => looks += 1,
+            let arrived = self.hover(&[first.base_from_tcp], shift_m, GraspStep::Hover);
+            if !self.has_arrived(arrived, looks == 0)? {
+                continue;
             }
+            looks += 1;
             self.report.looks[1] = looks;
             if let Some(target) = self.find(|target| target.score >= SURE || confirms(first, target))? {
                 return Ok(target);
             }
         }
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks from above it")))
+    }
+
+    /// Whether the arm has arrived at a place for a picture. An unreachable place is skipped unless it is the first;
+    /// an error, such as a stop by a person, ends the sequence.
+    pub(super) fn has_arrived(&self, arrived: Steps<()>, is_first: bool) -> Steps<bool> {
+        match arrived {
+            Ok(()) => Ok(true),
+            Err(Stop::Failed(..)) if !is_first && self.robot.latched().is_none() => Ok(false),
+            Err(stop) => Err(stop),
+        }
     }
 
     /// Takes a picture and returns its accepted detection; a target that the hand cannot grasp is a failure.

@@ -86,7 +86,7 @@ pub struct GraspReport {
     pub height: Option<HeightReport>,
 }
 
-/// Grasps the part once.
+/// Grasps the part once. A hand that holds an object at the beginning is a failed grasp, and nothing moves.
 ///
 /// # Errors
 /// A failure of perception, an unreachable first look-out pose, and every error that stops the arm or loses the
@@ -217,7 +217,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             picture_time: None,
             closed: None,
             held: None,
-            surface_m: None,
+            surface_m: config.surface_m,
             lying: LyingParts::new(&config.lying),
             opening_m: robot.geometry().hand.opening_max_m,
             opening_margin_m: config.opening_margin_m,
@@ -248,6 +248,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
     }
 
     fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
+        self.check_hand()?;
         let first = self.look_around()?;
         let target = match self.cell.camera {
             CameraPose::OnFlange(_) => {
@@ -258,6 +259,15 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         };
         is_wanted(self, &target)?;
         self.take(&target)
+    }
+
+    /// Fails if the hand holds an object: the sequence opens the hand in the air, and the object would fall.
+    fn check_hand(&mut self) -> Steps<()> {
+        if self.robot.hand()?.is_grasping {
+            let why = "the hand still holds an object: first open it, with sdg robot open".to_owned();
+            return Err(Stop::Failed(GraspStep::Detect, why));
+        }
+        Ok(())
     }
 
     /// Moves above a found part, grasps it, lifts it and holds it.

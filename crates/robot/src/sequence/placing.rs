@@ -219,14 +219,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
             // orientation.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
-            target.base_from_tcp.translation.z = match self.cell.config.height {
-                // If heights are measured, the place's height is given, and the part's height was measured before its
-                // first grasp.
-                Some(_) => aim.base_from_part.translation.z,
-                // Perception assumes that the part lies on the table.
-                None => found.base_from_tcp.translation.z + goal.surface_m - self.robot.limits().table_height_m,
-            };
-            self.known.surface_m = self.cell.config.height.map(|_| goal.surface_m);
+            // The place's height is given, and the part's height above its surface was known before the first grasp.
+            target.base_from_tcp.translation.z = aim.base_from_part.translation.z;
+            self.known.surface_m = Some(goal.surface_m);
             // Other parts may lie next to the part: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
@@ -317,10 +312,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
                 (CameraPose::InBase(_), _) => break,
             };
-            match arrived {
-                Err(stop) if look == 0 || self.robot.latched().is_some() => return Err(stop),
-                Err(_) => continue,
-                Ok(()) => {}
+            if !self.has_arrived(arrived, look == 0)? {
+                continue;
             }
             let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
             self.note_others();

@@ -24,7 +24,7 @@ const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 const NARROW_MARGIN_M: f64 = 0.020;
 /// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// Largest height above the grasp at which a contact does not fail the approach, m: the table's height is uncertain.
+/// Largest height above the grasp at which a compliant descent may end, m: the table's height is uncertain.
 const MAX_EARLY_M: f64 = 0.010;
 
 /// A path to above a grasp, with the straight descent to it.
@@ -38,7 +38,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.begin(GraspStep::Approach)?;
-        self.check_age()?;
         let limits = self.robot.limits();
         let lowest =
             self.surface_height_m().max(limits.table_height_m) + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
@@ -60,6 +59,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     continue;
                 }
             };
+            // Planning around obstacles may take a second.
+            self.check_age()?;
             self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
             return match reach {
                 Reach::Around(way) => self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),
@@ -137,14 +138,19 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M, ..*touch_down };
         let touched = self.touch_down(&touch_down, GraspStep::Approach)?;
-        let early_m = touched
-            .filter(|touched| touched.is_contact)
-            .map_or(0.0, |touched| touched.tcp_height_m - base_from_grasp.translation.z);
-        if early_m > MAX_EARLY_M {
-            let why = format!("the fingers touched an object {:.0} mm above the grasp", early_m * 1e3);
-            return Err(Stop::Failed(GraspStep::Approach, why));
+        let Some(touched) = touched else { return Ok(()) };
+        let early_m = touched.tcp_height_m - base_from_grasp.translation.z;
+        if early_m <= MAX_EARLY_M {
+            return Ok(());
         }
-        Ok(())
+        let early_mm = early_m * 1e3;
+        Err(Stop::Failed(
+            GraspStep::Approach,
+            match touched.is_contact {
+                true => format!("the fingers touched an object {early_mm:.0} mm above the grasp"),
+                false => format!("the soft descent ended {early_mm:.0} mm above the grasp without a lasting contact"),
+            },
+        ))
     }
 
     /// Moves straight down to a pose at the speed of an approach.

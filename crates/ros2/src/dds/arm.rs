@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use sdg_robot::{
     Arm, ArmGeometry, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load,
-    MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Watch,
+    MAX_WIDTH_CHANGE_M, MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Watch,
 };
 
 use super::action::{ActionClient, ActionType, Goal, GoalEnd};
@@ -53,7 +53,8 @@ pub struct TrajectoryArm {
     /// The end of the last motion, which the controller holds even if the measured position differs.
     commanded: Option<Joints>,
     hand: Option<(HandCommand, Goal)>,
-    is_grasping: bool,
+    /// Opening with which the last command grasped an object, m.
+    grasped_m: Option<f64>,
     num_feedback: u64,
 }
 
@@ -75,7 +76,7 @@ impl TrajectoryArm {
         node.wait_for_server(&gripper, timeout).map_err(unreachable)?;
         let states = StateReader::spawn(states, &config);
         let arm =
-            Self { states, motions, gripper, config, commanded: None, hand: None, is_grasping: false, num_feedback: 0 };
+            Self { states, motions, gripper, config, commanded: None, hand: None, grasped_m: None, num_feedback: 0 };
         let deadline = Instant::now() + timeout;
         while arm.states.latest().is_none() {
             if Instant::now() > deadline {
@@ -288,7 +289,7 @@ impl Arm for TrajectoryArm {
             let joints = self.config.finger_joints.join(", ");
             RobotError::Hand(format!("expected the joints {joints} on {}, found none of them", self.states.topic))
         })?;
-        Ok(HandState { opening_m, is_grasping: self.is_grasping, force_n: None })
+        Ok(HandState { opening_m, is_grasping: still_holds(self.grasped_m, opening_m), force_n: None })
     }
 
     fn start_hand(&mut self, command: HandCommand) -> Result<()> {
@@ -301,7 +302,7 @@ impl Arm for TrajectoryArm {
         let Some(goal) = self.gripper.send(goal, ANSWER).map_err(failed)? else {
             return Err(RobotError::Hand(format!("{} refused the command", self.gripper.name())));
         };
-        self.is_grasping = false;
+        self.grasped_m = None;
         self.hand = Some((command, goal));
         Ok(())
     }
@@ -321,13 +322,10 @@ impl Arm for TrajectoryArm {
         match (command, end) {
             // Controllers abort if the fingers meet resistance, which is normal for a grasp.
             (HandCommand::Grasp { .. }, GoalEnd::Succeeded | GoalEnd::Aborted) => {
-                self.is_grasping = result.stalled && opening_m > MIN_HELD_WIDTH_M;
-                let known = self.known()?;
-                Ok(HandState {
-                    opening_m: known.opening_m.unwrap_or(opening_m),
-                    is_grasping: self.is_grasping,
-                    force_n: None,
-                })
+                let is_grasping = result.stalled && opening_m > MIN_HELD_WIDTH_M;
+                let opening_m = self.known()?.opening_m.unwrap_or(opening_m);
+                self.grasped_m = is_grasping.then_some(opening_m);
+                Ok(HandState { opening_m, is_grasping, force_n: None })
             }
             (HandCommand::Move { .. }, GoalEnd::Succeeded) => self.hand(),
             (HandCommand::Move { opening_m: told_m, .. }, GoalEnd::Aborted) => Err(RobotError::Hand(format!(
@@ -364,5 +362,22 @@ impl Arm for TrajectoryArm {
     fn recover(&mut self) -> Result<()> {
         self.commanded = None;
         self.known().map(drop)
+    }
+}
+
+/// Whether an object grasped with an opening (m) is still between the fingers at their present opening (m): another
+/// client of the gripper may have released it.
+fn still_holds(grasped_m: Option<f64>, opening_m: f64) -> bool {
+    grasped_m.is_some_and(|grasped_m| (opening_m - grasped_m).abs() <= MAX_WIDTH_CHANGE_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_that_another_client_released_is_not_held() {
+        assert!(still_holds(Some(0.030), 0.031));
+        assert!(!still_holds(Some(0.030), 0.080) && !still_holds(Some(0.030), 0.0) && !still_holds(None, 0.030));
     }
 }

@@ -2,10 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
+use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::{Trajectory, ready_pose};
-use sdg_robot::{DEFAULT_SPEED, Destination, FREE_CLEARANCE_M, FrankaArm, Robot, Surroundings};
+use sdg_robot::workcell::Workcell;
+use sdg_robot::{
+    Arm, ContactSensitivity, DEFAULT_SPEED, Destination, FREE_CLEARANCE_M, FrankaArm, Pace, Robot, RobotError,
+    SafetyLimits, Surroundings,
+};
 
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
@@ -52,22 +57,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     arm.check_model(workcell.robot)?;
     let interrupt = Interrupt::watch();
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
-    let home = workcell.home().unwrap_or_else(ready_pose);
-    let motions = if workcell.obstacles.is_empty() {
-        let motion = robot.plan_free(&home, &pace.free_limits(robot.geometry()))?;
-        // The motion is checked before the question is asked.
-        robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
-        vec![motion]
-    } else {
-        let surroundings = Surroundings {
-            obstacles: &workcell.obstacles,
-            table_clearance_m: FREE_CLEARANCE_M,
-            ..Surroundings::default()
-        };
-        robot
-            .plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits(robot.geometry()))?
-            .motions
-    };
+    let motions = plan(&mut robot, &workcell, &pace)?;
     if motions.iter().all(|motion| motion.duration_secs() <= 0.0) {
         eprintln!("the arm at {address} is at home");
         return Ok(Outcome::Done);
@@ -77,12 +67,167 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     eprintln!("moving home, {secs:.1} s; Ctrl-C stops the arm");
-    for motion in motions {
-        let moved = robot.follow(motion);
-        if moved.is_err() {
-            write_states(&args.states, robot.watch())?;
-        }
-        moved?;
+    let moved = follow(&mut robot, motions);
+    if moved.is_err() {
+        write_states(&args.states, robot.watch())?;
     }
+    moved?;
     Ok(Outcome::Done)
+}
+
+/// The motions home, which are checked before the question is asked.
+fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> Result<Vec<Trajectory>> {
+    let home = workcell.home().unwrap_or_else(ready_pose);
+    let is_holding = robot.hand()?.is_grasping;
+    let joints = match is_holding {
+        true => pace.carry_limits(robot.geometry()),
+        false => pace.free_limits(robot.geometry()),
+    };
+    if workcell.obstacles.is_empty() {
+        let motion = robot.plan_free(&home, &joints)?;
+        robot.limits().check(motion.clone()).map_err(RobotError::from)?;
+        check_height(&motion, robot.limits(), if is_holding { workcell.part_radius_m } else { 0.0 })?;
+        return Ok(vec![motion]);
+    }
+    // Only the largest extent of the part from the tcp is known.
+    let part = [Capsule::new([0.0; 3], [0.0; 3], workcell.part_radius_m)];
+    let surroundings = Surroundings {
+        obstacles: &workcell.obstacles,
+        held: if is_holding { &part[..] } else { &[] },
+        table_clearance_m: FREE_CLEARANCE_M,
+        ..Surroundings::default()
+    };
+    Ok(robot.plan_around(&surroundings, &Destination::Configuration(&home), &joints)?.motions)
+}
+
+/// Fails if a motion from above the minimum height of free motions passes below it. From a lower start, for example
+/// after a stop near the table, only the limits apply, because the arm must be able to leave it. A held part extends
+/// `held_m` below the fingers.
+fn check_height(motion: &Trajectory, limits: &SafetyLimits, held_m: f64) -> Result<()> {
+    let (arm, table_height_m) = (&limits.geometry, limits.table_height_m);
+    let [start_m, end_m] = [motion.start(), motion.end()].map(|q| arm.clearance(q, table_height_m).lowest_m);
+    let (lowest_m, free_m) = (motion.clearance(arm, table_height_m).lowest_m, FREE_CLEARANCE_M + held_m);
+    // The path may be lower only if its destination is.
+    let min_m = free_m.min(end_m - 1e-3);
+    if start_m >= free_m && lowest_m < min_m {
+        let [lowest_mm, min_mm] = [lowest_m, min_m].map(|height_m| height_m * 1e3);
+        bail!("the path home passes {lowest_mm:.0} mm above the table, expected at least {min_mm:.0} mm");
+    }
+    Ok(())
+}
+
+fn follow<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>) -> sdg_robot::Result<()> {
+    // After a stop during a descent, the controller has the higher thresholds of contacts.
+    robot.set_contact_sensitivity(ContactSensitivity::Free)?;
+    motions.into_iter().try_for_each(|motion| robot.follow(motion))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use nalgebra::Isometry3;
+    use sdg_kinematics::collision::{Obstacle, Shape};
+    use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
+    use sdg_robot::{ArmState, CheckedMotion, HandCommand, HandState, Load, LookOut, MotionEnd, PlannedArm, Watch};
+
+    use super::*;
+
+    /// A planned arm after a stop during a descent.
+    struct Stopped {
+        arm: PlannedArm,
+        sensitivity: ContactSensitivity,
+    }
+
+    impl Arm for Stopped {
+        fn geometry(&self) -> &ArmGeometry {
+            self.arm.geometry()
+        }
+        fn state(&mut self) -> sdg_robot::Result<ArmState> {
+            self.arm.state()
+        }
+        fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> sdg_robot::Result<MotionEnd> {
+            assert_eq!(self.sensitivity, ContactSensitivity::Free);
+            self.arm.follow(motion, watch)
+        }
+        fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> sdg_robot::Result<()> {
+            self.arm.wait(duration_secs, watch)
+        }
+        fn hand(&mut self) -> sdg_robot::Result<HandState> {
+            self.arm.hand()
+        }
+        fn start_hand(&mut self, command: HandCommand) -> sdg_robot::Result<()> {
+            self.arm.start_hand(command)
+        }
+        fn finish_hand(&mut self, watch: &mut Watch) -> sdg_robot::Result<HandState> {
+            self.arm.finish_hand(watch)
+        }
+        fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> sdg_robot::Result<()> {
+            self.sensitivity = sensitivity;
+            Ok(())
+        }
+        fn set_load(&mut self, load: Load) -> sdg_robot::Result<()> {
+            self.arm.set_load(load)
+        }
+        fn stop(&mut self) -> sdg_robot::Result<()> {
+            self.arm.stop()
+        }
+        fn recover(&mut self) -> sdg_robot::Result<()> {
+            self.arm.recover()
+        }
+    }
+
+    /// The shipped workcell with a home that has joint 1 at 0.5 rad.
+    fn workcell() -> Workcell {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell/workcell.toml");
+        let mut home = ready_pose();
+        home[0] = 0.5;
+        let (workcell, _) = sdg_inputs::read_workcell(&path).unwrap();
+        Workcell { look_outs: vec![LookOut::Joints(home)], ..workcell }
+    }
+
+    /// Moves home from the ready pose.
+    fn go_home(workcell: &Workcell, is_grasping: bool) -> Result<()> {
+        let hand = HandState { opening_m: 0.02, is_grasping, force_n: None };
+        let arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), hand.opening_m).with_hand(hand);
+        let mut arm = Stopped { arm, sensitivity: ContactSensitivity::Contact };
+        let mut robot = Robot::new(&mut arm, workcell.safety_limits(), Watch::default());
+        let motions = plan(&mut robot, workcell, &Pace::at_speed(0.1).unwrap())?;
+        Ok(follow(&mut robot, motions)?)
+    }
+
+    #[test]
+    fn the_thresholds_are_those_of_free_motions() {
+        go_home(&workcell(), false).unwrap();
+    }
+
+    #[test]
+    fn a_held_part_keeps_away_from_obstacles() {
+        // The obstacle is 40 mm below the tcp in the ready pose; the part's radius is 60 mm.
+        let tcp = ArmGeometry::panda().forward(&ready_pose()).translation;
+        let obstacle = Obstacle {
+            name: "post".to_owned(),
+            shape: Shape::Box { half_m: [0.02; 3] },
+            base_from_obstacle: Isometry3::translation(tcp.x, tcp.y, tcp.z - 0.06),
+        };
+        let workcell = Workcell { obstacles: vec![obstacle], ..workcell() };
+        go_home(&workcell, false).unwrap();
+        let error = go_home(&workcell, true).unwrap_err().to_string();
+        assert!(error.contains("post"), "{error}");
+    }
+
+    #[test]
+    fn only_a_motion_from_a_high_start_is_refused_near_the_table() {
+        // Without a tilt, the hand points down and the tcp is 40 mm above the table.
+        let tilted = |by_rad: f64| {
+            JointVector::from([0.0, 0.726, 0.0, -1.796, 0.0, 2.522 + by_rad, std::f64::consts::FRAC_PI_4])
+        };
+        let limits = SafetyLimits::default();
+        let motion = |from: &JointVector, to: &JointVector| {
+            Trajectory::point_to_point(from, to, &JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
+        };
+        let error = check_height(&motion(&tilted(-1.45), &tilted(1.15)), &limits, 0.0).unwrap_err().to_string();
+        assert!(error.starts_with("the path home passes "), "{error}");
+        check_height(&motion(&tilted(0.0), &tilted(1.15)), &limits, 0.0).unwrap();
+    }
 }

@@ -35,10 +35,10 @@ pub use paired::PairedCounts;
 pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
 pub use selection::{GraspCondition, Selection};
 pub use settings::{AttemptSettings, AxisSettings};
+pub(super) use summary::instances_in_picture;
 pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
 };
-pub(super) use summary::instances_in_picture;
 pub use tables::{markdown, tables};
 pub use units::{AxesEvaluation, GRASPING_MODELS};
 pub use way::Way;

@@ -1,14 +1,16 @@
 use super::*;
-use crate::arm_state::{ArmState, ContactSensitivity, HandState, MotionEnd};
+use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandState, MotionEnd};
+use crate::error::RobotError;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::safety::{CheckedMotion, SafetyLimits};
-use crate::sequence::LookOut;
-use crate::watch::Watch;
+use crate::sequence::{LookOut, grasp};
+use crate::watch::{StopReason, Watch};
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{ArmGeometry, ready_pose};
+use std::time::{Duration, Instant};
 
 /// A planned arm with a part that slides by `slide`, in the part's frame, when the hand closes on it, and stays where
 /// it is released.
@@ -19,6 +21,9 @@ struct Cell {
     tcp_from_part: Option<Isometry3<f64>>,
     loads_kg: Vec<f64>,
     touches: bool,
+    mode: ArmMode,
+    /// Time until the arm returns a state.
+    delay: Duration,
 }
 
 impl Cell {
@@ -33,7 +38,8 @@ impl Arm for Cell {
     }
 
     fn state(&mut self) -> Result<ArmState> {
-        self.arm.state()
+        std::thread::sleep(self.delay);
+        Ok(ArmState { mode: self.mode, ..self.arm.state()? })
     }
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
         self.arm.follow(motion, watch)
@@ -104,6 +110,8 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         tcp_from_part: None,
         loads_kg: Vec::new(),
         touches: true,
+        mode: ArmMode::Idle,
+        delay: Duration::ZERO,
     }
 }
 
@@ -148,6 +156,53 @@ fn a_part_lies_where_it_was_to_lie() {
     }
 }
 
+/// Finds nothing; a person presses the stop button during the first picture.
+struct Stopped;
+
+impl PartFinder<Cell> for Stopped {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        cell.mode = ArmMode::UserStopped;
+        Ok(None)
+    }
+}
+
+#[test]
+fn a_stop_between_two_pictures_ends_the_sequence() {
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose()); 2], ..config() };
+    let ended = grasp(&mut robot, &mut Stopped, &mut (), CameraPose::InBase(Isometry3::identity()), &config);
+    assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
+}
+
+/// Finds the part; planning with this picture takes longer than [`MAX_AGE`].
+struct SlowlyPlanned(Option<Instant>);
+
+const MAX_AGE: Duration = Duration::from_millis(50);
+
+impl PartFinder<Cell> for SlowlyPlanned {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(10));
+        Truth.find(cell)
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        self.0
+    }
+}
+
+#[test]
+fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), ..config() };
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let report = grasp(&mut robot, &mut SlowlyPlanned(None), &mut (), camera, &config).unwrap();
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.starts_with("the detection is "), "{why}");
+    assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
+}
+
 /// Records the steps that begin.
 struct Begun(Vec<GraspStep>);
 
@@ -190,6 +245,26 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
 }
 
 #[test]
+fn a_part_that_slides_is_taken_again_from_a_raised_place() {
+    let mut cell = cell(planar(0.005, 0.001, 0.08));
+    let goal = Place { surface_m: 0.03, ..tray() }.goal(2).unwrap();
+    let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 2);
+    assert!((cell.base_from_part.translation.z - 0.05).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
+fn a_part_on_a_raised_surface_is_put_down_onto_a_lower_one() {
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.04;
+    let config = GraspConfig { surface_m: Some(0.02), ..config() };
+    let report = run(&mut cell, &config, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
 fn turns_that_cannot_be_seen_do_not_count() {
     let mut cell = cell(Isometry3::identity());
     let place = Place { yaw_rad: 0.4 + std::f64::consts::PI - 0.2, ..tray() };
@@ -210,6 +285,16 @@ fn where_nothing_is_felt_the_part_stays_in_the_hand() {
     assert!(why.contains("no contact was measured") && why.contains("still held"), "{why}");
     assert_eq!(cell.loads_kg, [0.3]);
     assert!(matches!(cell.arm.actions().last(), Some(PlannedAction::Down { .. })), "{:?}", cell.arm.actions().last());
+}
+
+#[test]
+fn a_hand_that_holds_a_part_at_the_beginning_keeps_it() {
+    let mut cell = cell(Isometry3::identity());
+    cell.arm = cell.arm.with_hand(HandState { opening_m: 0.02, is_grasping: true, force_n: None });
+    let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("still holds an object"), "{why}");
+    assert!(cell.arm.actions().is_empty());
 }
 
 #[test]
