@@ -93,7 +93,7 @@ impl TouchDown {
 /// The result of a touch-down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched {
-    /// Whether there was a contact before the path's end, and at least half of the requested force at the end.
+    /// Whether there was a contact before the path's end, and at least a quarter of the requested force at the end.
     pub is_contact: bool,
     /// Measured height of the tcp in the base frame at the end, m.
     pub tcp_height_m: f64,
