@@ -16,7 +16,7 @@ use sdg_simulation::{Workcell, WorkcellConfig, marked_grasp};
 use crate::calibrated_camera::taught;
 
 /// Height of the part above the table, in metres.
-const RAISED_M: f64 = 0.030;
+const RAISED_M: f64 = 0.060;
 
 /// The simulated pictures, counted.
 #[derive(Debug)]

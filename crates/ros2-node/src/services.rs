@@ -14,7 +14,6 @@ use sdg_ros2::messages::{
     TriggerResponse,
 };
 
-use crate::POLL_INTERVAL;
 use crate::grasping::Grasping;
 use crate::lines::Lines;
 use crate::searching::Searched;
@@ -24,6 +23,9 @@ use crate::teaching::{Teach, TeachJob, Teaching};
 const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Maximum timeout for a picture.
 const MAX_DETECT_TIMEOUT_SECS: f64 = 60.0;
+
+/// Interval of checks for the end of a grasp.
+const FINISH_POLL: Duration = Duration::from_millis(5);
 
 const TRIGGER: ServiceType = ServiceType { package: "std_srvs", name: "Trigger" };
 
@@ -228,7 +230,7 @@ impl Services {
     /// Waits for a running grasp, which stops when the node is interrupted, because the arm may still move until then.
     pub(super) fn finish(&mut self) {
         while self.grasp.as_ref().is_some_and(|(_, grasping)| grasping.is_running()) {
-            std::thread::sleep(POLL_INTERVAL);
+            std::thread::sleep(FINISH_POLL);
         }
         if let Some(why) = self.answer_grasp() {
             self.lines.complain(&why);
