@@ -3,6 +3,8 @@
 CARGO ?= cargo
 # One profile for tests and runs, so a fresh machine compiles burn only once.
 RELEASE := --release
+# The rules below name programs in target, so everything is built there. A script that needs another folder sets it by itself.
+override export CARGO_TARGET_DIR := $(CURDIR)/target
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser test-web film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage

@@ -13,7 +13,7 @@ abi=$(sed -n 's/^#define SDG_ABI_VERSION \([0-9]*\)u$/\1/p' crates/capi/include/
 rm -rf "$folder"
 mkdir -p "$folder"/{lib/pkgconfig,lib/cmake/sdg,include}
 cp crates/capi/include/sdg.h "$folder/include/"
-cp target/release/examples/libsdg.so "$folder/lib/libsdg.so.$abi"
+cp "${CARGO_TARGET_DIR:-target}/release/examples/libsdg.so" "$folder/lib/libsdg.so.$abi"
 ln -s "libsdg.so.$abi" "$folder/lib/libsdg.so"
 for file in pkgconfig/sdg.pc cmake/sdg/sdg-config.cmake cmake/sdg/sdg-config-version.cmake; do
     sed -e "s/@VERSION@/$version/" -e "s/@ABI@/$abi/" "crates/capi/installed/${file##*/}" >"$folder/lib/$file"

@@ -20,7 +20,7 @@ for section in ${SECTIONS:-input}; do
     input)
         scripts/build.sh --bin hardening
         # shellcheck disable=SC2086 # names of targets
-        target/release/hardening --executions "${EXECUTIONS:-100000}" "${seconds[@]}" ${TARGETS:-}
+        "${CARGO_TARGET_DIR:-target}/release/hardening" --executions "${EXECUTIONS:-100000}" "${seconds[@]}" ${TARGETS:-}
         ;;
     sync)
         scripts/install.sh strace
