@@ -26,3 +26,18 @@ fn make_builds_into_the_folder_whose_programs_it_runs() {
     );
     assert_eq!(found, format!("{}\n", root().join("target").display()));
 }
+
+#[test]
+fn the_c_library_is_installed_beside_other_files() {
+    // The library is not built; a relative folder is one of the caller.
+    bash(
+        "export CARGO=true CARGO_TARGET_DIR=$1/built
+        mkdir -p $1/built/release/examples $1/usr/lib
+        touch $1/built/release/examples/libsdg.so $1/usr/lib/{libother.so,libsdg.so.0}
+        script=$PWD/scripts/c/install.sh
+        cd $1
+        $script usr
+        ls usr/lib/{libother.so,libsdg.so,pkgconfig/sdg.pc}
+        [ ! -e usr/lib/libsdg.so.0 ]",
+    );
+}
