@@ -41,3 +41,21 @@ fn the_c_library_is_installed_beside_other_files() {
         [ ! -e usr/lib/libsdg.so.0 ]",
     );
 }
+
+#[test]
+fn a_release_is_not_compared_with_its_own_tag() {
+    let found = bash(
+        "mkdir -p $1/scripts/packages
+        cp scripts/packages/semver.sh $1/scripts/packages
+        cd $1
+        git init -q
+        commit() { git -c user.name=a -c user.email=a commit -q --allow-empty -m a; }
+        cargo() { echo $*; }
+        export -f cargo
+        mkdir -p target/packages/tools/bin
+        ln -s /bin/true target/packages/tools/bin/cargo-semver-checks
+        for tag in v0.9.0 v0.10.0; do commit; git tag $tag; scripts/packages/semver.sh geometry; done",
+    );
+    assert!(found.starts_with("release: interfaces not compared"), "{found}");
+    assert!(found.ends_with("semver-checks --baseline-rev v0.9.0 --package=sdg-geometry\n"), "{found}");
+}
