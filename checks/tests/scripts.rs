@@ -59,3 +59,23 @@ fn a_release_is_not_compared_with_its_own_tag() {
     assert!(found.starts_with("release: interfaces not compared"), "{found}");
     assert!(found.ends_with("semver-checks --baseline-rev v0.9.0 --package=sdg-geometry\n"), "{found}");
 }
+
+#[test]
+fn packages_may_be_installed_for_several_architectures() {
+    // The name of a package lists the architectures for which it is installed.
+    let found = bash(
+        r#"id() { echo 0; }
+        dpkg() { echo amd64; }
+        dpkg-query() {
+            name=${4%:*}
+            for kind in ${name//-/ }; do
+                sed -e 's/${db:Status-Status}/installed/' -e "s/\${Architecture}/$kind/" -e 's/\\n//' <<<"$3"
+            done
+        }
+        apt-get() { :; }
+        env() { :; }
+        export -f id dpkg dpkg-query apt-get env
+        scripts/install.sh amd64-arm64 all arm64:arm64 arm64 2>&1"#,
+    );
+    assert_eq!(found, "setup: installing arm64\n");
+}
