@@ -79,3 +79,27 @@ fn packages_may_be_installed_for_several_architectures() {
     );
     assert_eq!(found, "setup: installing arm64\n");
 }
+
+/// A machine for [`bash`] with a C compiler, whose apt has no simulator.
+const WITHOUT_SIMULATOR: &str = "export CARGO=cargo
+    id() { echo 0; }
+    cargo() { echo cargo $version; }
+    dpkg() { echo amd64; }
+    dpkg-query() { case ${@: -1} in gcc | libc6-dev) echo installed amd64 ;; *) return 1 ;; esac; }
+    apt-get() { return 100; }
+    apt-cache() { return 100; }
+    export -f id cargo dpkg dpkg-query apt-get apt-cache
+    export version\n";
+
+#[test]
+fn a_machine_without_simulator_builds_with_one_line() {
+    let found = bash(&format!("version=99.0.0\n{WITHOUT_SIMULATOR}scripts/setup.sh 2>&1"));
+    let last = found.lines().next_back().unwrap();
+    assert!(last.contains("libmujoco-dev") && last.ends_with("does not simulate"), "{found}");
+}
+
+#[test]
+fn an_old_compiler_is_told() {
+    let found = bash(&format!("version=1.9.0\n{WITHOUT_SIMULATOR}! scripts/setup.sh 2>&1"));
+    assert!(found.contains(concat!("expected Rust ", env!("CARGO_PKG_RUST_VERSION"))), "{found}");
+}
