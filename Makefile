@@ -130,7 +130,7 @@ windows: setup ## sdg.exe without simulator, as a zip in target/packages/windows
 release: setup ## All packages with checksums, lists of their contents, and the check of the libraries' interfaces, in target/packages/release
 	@scripts/packages/release.sh
 
-hardening: setup ## Hostile input for every reader of files and messages from outside, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
+hardening: setup ## Hostile input for every reader of files and messages from outside, resumed where the same program ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
 	@QUICK="$(QUICK)" SECTIONS="$(or $(SECTIONS),$(if $(COVERAGE),coverage))" EXECUTIONS="$(EXECUTIONS)" TARGETS="$(TARGETS)" SHOW="$(SHOW)" scripts/hardening/run.sh
 
 endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot with wrong perception (SECTION="crash soak", QUICK=1; root)
