@@ -232,8 +232,7 @@ bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo
 	$(CARGO) build $(RELEASE) --locked --workspace --example planning
 	target/release/examples/planning rate
 	target/release/examples/planning proof 1000
-	[ -x target/plan-peers/bin/python ] || python3 -m venv target/plan-peers
-	target/plan-peers/bin/pip install --quiet --disable-pip-version-check ompl
+	scripts/python/venv.sh target/plan-peers ompl
 	target/plan-peers/bin/python benches/peers/ompl_planning.py target/release/examples/planning 300 0 0.005
 
 clean: ## Removes what was built and reported

@@ -103,3 +103,21 @@ fn an_old_compiler_is_told() {
     let found = bash(&format!("version=1.9.0\n{WITHOUT_SIMULATOR}! scripts/setup.sh 2>&1"));
     assert!(found.contains(concat!("expected Rust ", env!("CARGO_PKG_RUST_VERSION"))), "{found}");
 }
+
+#[test]
+fn an_environment_is_made_again_for_another_python_or_folder() {
+    let found = bash(
+        "python3() {
+            case $1 in
+            -V) echo Python $version ;;
+            -m) mkdir -p $3/bin; ln -s /bin/true $3/bin/python; ln -s /bin/true $3/bin/pip; echo $3 made for $version ;;
+            esac
+        }
+        export -f python3
+        for version in 3.11 3.11 3.12; do version=$version scripts/python/venv.sh $1/first a==1; done
+        mv $1/first $1/second
+        version=3.12 scripts/python/venv.sh $1/second a==1",
+    );
+    let made: Vec<&str> = found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect();
+    assert_eq!(made, ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
+}
