@@ -121,3 +121,14 @@ fn an_environment_is_made_again_for_another_python_or_folder() {
     let made: Vec<&str> = found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect();
     assert_eq!(made, ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
 }
+
+#[test]
+fn packages_are_not_built_without_git() {
+    let found = bash(
+        "cp -r scripts $1
+        cd $1
+        export GIT_CEILING_DIRECTORIES=${PWD%/*}
+        for package in deb tarball image windows lay_out; do ! scripts/packages/$package.sh usr 2>&1; done",
+    );
+    assert_eq!(found.matches("packages: expected a git clone").count(), 5, "{found}");
+}
