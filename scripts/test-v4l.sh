@@ -4,6 +4,8 @@
 # Kernel and initramfs stay in target/v4l.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+# Debian has depmod and modprobe in folders that are only in root's PATH.
+PATH=$PATH:/usr/sbin:/sbin
 
 scripts/install.sh qemu-system-x86 busybox-static cpio kmod
 target=${CARGO_TARGET_DIR:-target}

@@ -224,6 +224,40 @@ fn crates_that_never_see_burn_do_not() {
     }
 }
 
+/// The text after `start` up to the next quotation mark.
+fn quoted<'a>(text: &'a str, start: &str) -> Option<&'a str> {
+    text.split_once(start)?.1.split('"').next()
+}
+
+/// Cargo accepts an earlier compatible version, and CI does not use the Python package and CMake in each run.
+#[test]
+fn every_version_is_that_of_the_workspace() {
+    let read = |file: &str| fs::read_to_string(root().join(file)).unwrap();
+    let mut faults = Vec::new();
+    let mut compare = |file: &str, found: Option<&str>, expected: &str| {
+        if found != Some(expected) {
+            faults.push(format!("{file}: expected version {expected}, found {found:?}"));
+        }
+    };
+    let version = env!("CARGO_PKG_VERSION");
+    for manifest in tracked("*Cargo.toml") {
+        for line in read(&manifest).lines().filter(|line| line.starts_with("sdg-") && line.contains("path = ")) {
+            if line.contains("version = ") {
+                compare(&manifest, quoted(line, "version = \""), version);
+            }
+        }
+    }
+    let package = "python/sdg/__init__.py";
+    compare(package, quoted(&read(package), "\n__version__ = \""), version);
+    let expected = concat!(env!("CARGO_PKG_VERSION_MAJOR"), ".", env!("CARGO_PKG_VERSION_MINOR"));
+    for file in ["docs/c.md", "crates/capi/tests/CMakeLists.txt"] {
+        let text = read(file);
+        let found = text.split_once("find_package(sdg ").and_then(|(_, rest)| rest.split(' ').next());
+        compare(file, found, expected);
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
 /// A change of the weights must also change their provenance.
 #[test]
 fn the_shipped_weights_are_those_whose_provenance_is_told() {

@@ -3,5 +3,6 @@
 
 mod documents;
 mod import_cycles;
+mod scripts;
 mod site;
 mod tables;

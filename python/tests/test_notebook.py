@@ -1,6 +1,7 @@
 """Tests that the notebook's cells run in order, without Jupyter, and that its picture has the grasp at the part's new position."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,17 @@ from conftest import ROOT
 NOTEBOOK = ROOT / "python" / "notebook" / "photo_to_metres.ipynb"
 NUM_CELLS = 10
 RED, OUTLINE = (255, 40, 40), (0, 160, 255)
+
+
+def test_the_notebook_and_the_guide_install_the_wheel_into_an_environment() -> None:
+    # Debian's pip installs nothing outside of one.
+    guide = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    block = re.search(r"```\nmake wheel\n(.*?)```", guide, re.DOTALL)
+    assert block is not None
+    make, install = block[1].splitlines()
+    assert make == "python3 -m venv sdg-python" and install.startswith("sdg-python/bin/pip install ")
+    first = "".join(json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"][0]["source"])
+    assert f"`{make}`" in first and f"`{install}`" in first
 
 
 def test_the_notebook_runs_and_draws_the_grasp(tmp_path: Path) -> None:

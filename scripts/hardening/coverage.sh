@@ -17,7 +17,7 @@ mkdir -p "$out/figures"
 # Programs of the build also write counts.
 LLVM_PROFILE_FILE="$PWD/$out/build-%p.profraw" RUSTC_WORKSPACE_WRAPPER="$PWD/scripts/hardening/instrument.sh" \
     scripts/build.sh --bin hardening
-cp target/release/hardening "$out/hardening"
+cp "${CARGO_TARGET_DIR:-target}/release/hardening" "$out/hardening"
 # Restores the program without counters.
 scripts/build.sh --bin hardening
 

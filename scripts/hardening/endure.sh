@@ -18,26 +18,27 @@ sections=("$@")
 [ ${#sections[@]} -gt 0 ] || sections=(crash refusals soak robot)
 
 scripts/build.sh --bin sdg --bin endurance
-endurance=target/release/endurance
+programs=${CARGO_TARGET_DIR:-target}/release
 failed=()
 try() { "$@" || failed+=("$*"); }
+endurance() { try "$programs/endurance" --sdg "$programs/sdg" "$@"; }
 for section in "${sections[@]}"; do
     case $section in
-        crash) try $endurance crash --kills "$kills" ;;
+        crash) endurance crash --kills "$kills" ;;
         refusals)
             scripts/install.sh libfaketime python3
-            try $endurance refusals
+            endurance refusals
             ;;
         soak)
-            try $endurance frames --frames "$frames" --max-secs "$secs"
-            try $endurance frames --frames $((frames / 10)) --every-frame --max-secs "$secs"
-            try $endurance frames --model C --frames $((frames / 5)) --every-frame --max-secs "$secs"
-            try $endurance frames --frames $((disconnections + 1)) --frames-a-connection 1 --max-secs "$secs"
-            try $endurance page --sessions "$sessions" --max-secs "$secs"
+            endurance frames --frames "$frames" --max-secs "$secs"
+            endurance frames --frames $((frames / 10)) --every-frame --max-secs "$secs"
+            endurance frames --model C --frames $((frames / 5)) --every-frame --max-secs "$secs"
+            endurance frames --frames $((disconnections + 1)) --frames-a-connection 1 --max-secs "$secs"
+            endurance page --sessions "$sessions" --max-secs "$secs"
             ;;
         robot)
             scripts/build.sh --example endured_attempts
-            try target/release/examples/endured_attempts "$attempts" 0 "$secs"
+            try "$programs/examples/endured_attempts" "$attempts" 0 "$secs"
             ;;
         limits) try scripts/hardening/limits.sh ;;
         mutants) try scripts/hardening/mutants.sh ;;

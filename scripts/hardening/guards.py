@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Breaks each guard in a copy of the repository, and prints the tests that notice it: `scripts/hardening/guards.py [WORD…]` for guards
-whose line contains a word. Results stay in target/hardening/guards/found.json and are not repeated; delete it to start again."""
+whose line contains a word. Results stay in target/hardening/guards/found.json and are not repeated at the same commit; delete it to
+start again."""
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -129,14 +131,16 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended"))
     words = sys.argv[1:]
     guards = [guard for word in words for guard in GUARDS if word in guard[0] or word in guard[4]] if words else GUARDS
-    tree = WORK / "tree"
-    tree.mkdir(parents=True, exist_ok=True)
+    tree, kept = WORK / "tree", WORK / "found.json"
     commit = run(["git", "rev-parse", "HEAD"], cwd=ROOT).stdout.strip()
     at = WORK / "commit"
     if not at.exists() or at.read_text() != commit:
+        # Results and files of another commit say nothing about this one.
+        kept.unlink(missing_ok=True)
+        shutil.rmtree(tree, ignore_errors=True)
+        tree.mkdir(parents=True)
         subprocess.run(f"git archive {commit} | tar -x -m -C '{tree}'", shell=True, check=True, cwd=ROOT)
         at.write_text(commit)
-    kept = WORK / "found.json"
     found = json.loads(kept.read_text()) if kept.exists() else {}
     for guard, file, intact, broken, package in guards:
         if guard not in found:

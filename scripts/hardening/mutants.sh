@@ -7,6 +7,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
+# cargo-mutants builds copies of the workspace, each in its own target folder.
+unset CARGO_TARGET_DIR
 command -v cargo-mutants >/dev/null || cargo install cargo-mutants --locked
 names=("$@")
 [ ${#names[@]} -gt 0 ] || names=(safety timing fci)

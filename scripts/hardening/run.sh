@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the sections of `make hardening` in SECTIONS, in order. Their results stay in target/hardening, from which a later run resumes.
+# Runs the sections of `make hardening` in SECTIONS, in order. Their results stay in target/hardening, from which a later run of the
+# same program, or of the same commit for guards, resumes.
 #   input       hostile input for every reader: EXECUTIONS for each of TARGETS (100000, all); figures in TARGET.json, failures in TARGET-NUMBER.bin
 #   sync        files are flushed before they get their names, checked by strace
 #   coverage    which lines of the readers the input reaches (coverage.sh)
@@ -20,7 +21,7 @@ for section in ${SECTIONS:-input}; do
     input)
         scripts/build.sh --bin hardening
         # shellcheck disable=SC2086 # names of targets
-        target/release/hardening --executions "${EXECUTIONS:-100000}" "${seconds[@]}" ${TARGETS:-}
+        "${CARGO_TARGET_DIR:-target}/release/hardening" --executions "${EXECUTIONS:-100000}" "${seconds[@]}" ${TARGETS:-}
         ;;
     sync)
         scripts/install.sh strace

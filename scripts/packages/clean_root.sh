@@ -3,5 +3,6 @@
 set -euo pipefail
 
 "$(dirname "$0")/../install.sh" mmdebstrap
-rm -rf "$2"
+# Not through a mount, as of /dev.
+rm -rf --one-file-system "$2"
 mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' ${3:+--include="$3"} "$1" "$2"

@@ -3,6 +3,7 @@
 # used and removed in a clean Debian root without network (needs root and mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+date=$(scripts/packages/commit_date.sh)
 source scripts/packages/arch.sh
 
 scripts/install.sh dpkg
@@ -39,9 +40,9 @@ Description: teach a robot a grasp from one photo
  .
  The recommended packages are for the simulated robot; nothing else needs them.
 END
-find "$root" -exec touch --no-dereference --date "@$(git log -1 --format=%ct)" {} +
+find "$root" -exec touch --no-dereference --date "@$date" {} +
 deb=$out/single-demo-grasp_${version}_$arch.deb
-SOURCE_DATE_EPOCH=$(git log -1 --format=%ct) dpkg-deb --root-owner-group -Zxz --build "$root" "$deb.new" >/dev/null
+SOURCE_DATE_EPOCH=$date dpkg-deb --root-owner-group -Zxz --build "$root" "$deb.new" >/dev/null
 mv "$deb.new" "$deb"
 rm -rf "$root"
 echo "deb: $deb, $(stat -c %s "$deb") bytes"

@@ -5,6 +5,8 @@
 # with a message. `make image`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+# lay_out.sh needs it; without it the build of the program would be in vain.
+scripts/packages/commit_date.sh >/dev/null
 source scripts/packages/arch.sh
 
 if [ "$arch" != amd64 ]; then
@@ -55,7 +57,8 @@ unshare --mount --net --pid --fork bash -euc '
     ip link set lo up
     in_image "$1" cp /usr/share/single-demo-grasp/pendulum/image.png photo.png
     in_image "$1" timeout 60 /usr/bin/sdg annotate --no-browser --json photo.png >"$1/data/address" &
-    while ! [ -s "$1/data/address" ]; do sleep 0.2; done
+    for _ in $(seq 250); do [ ! -s "$1/data/address" ] || break; sleep 0.2; done
+    [ -s "$1/data/address" ] || { echo "image: annotate has not printed its address in 50 s" >&2; exit 1; }
     python3 - "$1/data/address" <<"END"
 import json, sys, urllib.request
 address = json.load(open(sys.argv[1]))

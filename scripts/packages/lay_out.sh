@@ -3,6 +3,7 @@
 # Usage: lay_out.sh PREFIX
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+date=$(scripts/packages/commit_date.sh)
 source scripts/packages/arch.sh
 
 prefix=$1
@@ -27,4 +28,4 @@ install -D -m 644 -t "$prefix/share/doc/single-demo-grasp" LICENSE-MIT LICENSE-A
 gzip -9nc CHANGELOG.md >"$prefix/share/doc/single-demo-grasp/changelog.gz"
 chmod -R u=rwX,go=rX "$prefix"
 # With the commit's date, so the result always has the same bytes.
-find "$prefix" -exec touch --no-dereference --date "@$(git log -1 --format=%ct)" {} +
+find "$prefix" -exec touch --no-dereference --date "@$date" {} +

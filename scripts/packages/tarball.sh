@@ -3,6 +3,7 @@
 # `make tarball`. With TRY=1 it is then used in Debian 11, the oldest release with that library (needs root and mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+date=$(scripts/packages/commit_date.sh)
 source scripts/packages/arch.sh
 
 scripts/install.sh xz-utils
@@ -17,7 +18,7 @@ mv "$out/$name/bin/sdg" "$out/$name/lib/sdg"
 install -m 755 scripts/packages/start.sh "$out/$name/bin/sdg"
 tarball=$out/$name.tar.xz
 tar --create --xz --file "$tarball.new" --directory "$out" --sort=name --owner=0 --group=0 --numeric-owner \
-    --mtime "@$(git log -1 --format=%ct)" "$name"
+    --mtime "@$date" "$name"
 mv "$tarball.new" "$tarball"
 rm -rf "${out:?}/$name"
 echo "tarball: $tarball, $(stat -c %s "$tarball") bytes"

@@ -36,5 +36,8 @@ echo "deb: removed without a trace"
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 chroot "$root" apt-get update -qq
 chroot "$root" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --install-recommends /sdg.deb >/dev/null
-mount --bind /dev "$root/dev" && trap 'umount "$root/dev"' EXIT
-inside sdg rehearse --object pendulum --grasp-model "/tmp/erste Größe/pendulum.sdg" --attempts 1 --out /tmp/report | tail -2
+# The devices are mounted in a separate namespace: in that of the machine the mount would remain after a SIGKILL.
+unshare --mount --net --pid --fork bash -euc '
+    mount --bind /dev "$1/dev"
+    chroot "$1" sdg rehearse --object pendulum --grasp-model "/tmp/erste Größe/pendulum.sdg" --attempts 1 --out /tmp/report
+' unshare "$root" | tail -2

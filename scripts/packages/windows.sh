@@ -3,6 +3,7 @@
 # target/packages/windows/single-demo-grasp-VERSION-windows-x86_64.zip; `make windows`. With TRY=1 it is then tried under Wine.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+date=$(scripts/packages/commit_date.sh)
 source scripts/other_target.sh
 
 triple=x86_64-pc-windows-gnu
@@ -30,7 +31,7 @@ cp LICENSE-MIT LICENSE-APACHE "$out/$name/licences"
 for part in datasets/demonstrations/*/; do
     install -D -m 644 -t "$out/$name/photos/$(basename "$part")" "$part"image.png "$part"annotation.json
 done
-find "$out/$name" -exec touch --date "@$(git log -1 --format=%ct)" {} +
+find "$out/$name" -exec touch --date "@$date" {} +
 zip=$(realpath "$out")/$name.zip
 rm -f "$zip"
 (cd "$out" && find "$name" -print | sort | TZ=UTC zip --quiet -X "$zip" -@)

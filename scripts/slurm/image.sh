@@ -14,6 +14,8 @@ mkdir -p "$work/layer/usr/local/bin"
 
 scripts/oci_system.sh "$layout" sdg "$work"
 cp "$sdg" "$work/layer/usr/local/bin/sdg"
+# Everyone may run it, also if it was built and copied under a umask of 077.
+chmod -R u=rwX,go=rX "$work/layer"
 tar --create --owner=0 --group=0 --file "$work/sdg.tar" -C "$work/layer" usr
 umoci raw add-layer --image "$layout:sdg" "$work/sdg.tar"
 umoci config --image "$layout:sdg" --config.entrypoint /usr/local/bin/sdg --config.cmd --help

@@ -1,11 +1,13 @@
 //! `hardening [--executions N] [--seconds S] [--out DIR] [TARGET…]` executes the targets many times and resumes an
-//! earlier run; `--seconds` limits the time of all targets together. `hardening --input FILE TARGET` executes a target
-//! once and prints its panic in full.
+//! earlier run of the same program; `--seconds` limits the time of all targets together. `hardening --input FILE
+//! TARGET` executes a target once and prints its panic in full.
 //!
 //! A target's figures are in DIR/TARGET.json, and each input that caused a failure is in DIR/TARGET-NUMBER.bin.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
 
 use std::error::Error;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -57,15 +59,28 @@ fn asked() -> Result<Asked, Box<dyn Error>> {
     Ok(asked)
 }
 
-/// The figures that an earlier run wrote to `file`.
-fn reached(file: &Path) -> Value {
-    let text = fs::read_to_string(file).ok();
-    text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_else(|| json!({}))
+/// The checksum of the running program.
+fn program_crc32() -> io::Result<u32> {
+    Ok(crc32fast::hash(&fs::read(std::env::current_exe()?)?))
 }
 
-fn attack(target: &Target, executions: u64, until: Option<Instant>, out: &Path) -> Result<u64, Box<dyn Error>> {
+/// The figures that an earlier run of the program with this checksum wrote to `file`; those of another program say
+/// nothing about this one.
+fn reached(file: &Path, program_crc32: u32) -> Value {
+    let text = fs::read_to_string(file).ok();
+    let figures: Option<Value> = text.and_then(|text| serde_json::from_str(&text).ok());
+    figures.filter(|figures| figures["program_crc32"] == program_crc32).unwrap_or_else(|| json!({}))
+}
+
+fn attack(
+    target: &Target,
+    executions: u64,
+    until: Option<Instant>,
+    out: &Path,
+    program_crc32: u32,
+) -> Result<u64, Box<dyn Error>> {
     let file = out.join(format!("{}.json", target.name));
-    let earlier = reached(&file);
+    let earlier = reached(&file, program_crc32);
     let number = |key: &str| earlier[key].as_u64().unwrap_or(0);
     let (mut total, mut failures) = (number("executions"), number("failures"));
     let (mut accepted, mut most_bytes) = (number("accepted"), number("most_bytes"));
@@ -94,7 +109,7 @@ fn attack(target: &Target, executions: u64, until: Option<Instant>, out: &Path) 
         seconds += start.elapsed().as_secs_f64();
         let figures = json!({
             "executions": total, "accepted": accepted, "failures": failures, "most_bytes": most_bytes,
-            "slowest_secs": slowest_secs, "seconds": seconds,
+            "slowest_secs": slowest_secs, "seconds": seconds, "program_crc32": program_crc32,
         });
         let unfinished = file.with_extension("json.tmp");
         fs::write(&unfinished, format!("{figures:#}\n"))?;
@@ -118,6 +133,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ExitCode::SUCCESS);
     }
     fs::create_dir_all(&asked.out)?;
+    let program_crc32 = program_crc32()?;
     // Each panic becomes a line of the report; the default hook would print it a second time.
     std::panic::set_hook(Box::new(|_| {}));
     let mut failures = 0;
@@ -125,7 +141,21 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     for (place, target) in (1..).zip(&asked.targets) {
         // Time that one target does not use is left for the next ones.
         let until = asked.time.map(|time| begin + time * place / asked.targets.len() as u32);
-        failures += attack(target, asked.executions, until, &asked.out)?;
+        failures += attack(target, asked.executions, until, &asked.out, program_crc32)?;
     }
     Ok(if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_another_program_are_not_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("png.json");
+        fs::write(&file, json!({ "executions": 50, "program_crc32": 1 }).to_string()).unwrap();
+        assert_eq!(reached(&file, 1)["executions"], 50);
+        assert_eq!(reached(&file, 2), json!({}));
+    }
 }
