@@ -22,7 +22,7 @@ pub(super) struct Picture {
     pub(super) header: Header,
     pub(super) picture: Arc<RgbImage>,
     pub(super) arrived: Instant,
-    /// Time of the stamp, or of the arrival if the stamp is from another clock.
+    /// Time of the stamp, or of the arrival if the stamp is later or from another clock.
     pub(super) captured: SystemTime,
 }
 

@@ -179,14 +179,15 @@ impl Camera for RosCamera {
     }
 }
 
-/// The time at which a picture was taken; now, if the stamp comes from another clock.
+/// The time at which a picture was taken; now, if the stamp comes from another clock. It is never later than now, because
+/// a picture that was taken before the arm stopped must not seem to be taken after it.
 pub fn stamp_or_now(stamp: Time) -> SystemTime {
     let now = SystemTime::now();
     let is_near = |time: &SystemTime| {
         let apart = now.duration_since(*time).or_else(|_| time.duration_since(now));
         apart.is_ok_and(|apart| apart < MAX_STAMP_AGE)
     };
-    stamp.to_system().filter(is_near).unwrap_or(now)
+    stamp.to_system().filter(is_near).map_or(now, |time| time.min(now))
 }
 
 #[cfg(test)]
@@ -215,5 +216,11 @@ mod tests {
         for other in [Time { sec: 5, nanosec: 0 }, Time { sec: -1, nanosec: 0 }, Time { sec: 5, nanosec: u32::MAX }] {
             assert!(stamp_or_now(other) >= now);
         }
+    }
+
+    #[test]
+    fn a_stamp_in_the_future_is_the_time_of_arrival() {
+        let read = stamp_or_now(Time::from_system(SystemTime::now() + Duration::from_secs(2)));
+        assert!(read <= SystemTime::now());
     }
 }
