@@ -186,10 +186,22 @@ impl TrajectoryArm {
 
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
-        self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
+        let ended = self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
+        check_cancelled(ended.as_ref(), self.motions.name()).map_err(|why| self.lost(why))?;
         // The controller holds the position at which the arm stopped.
         self.forget_reference();
         Ok(())
+    }
+}
+
+/// Checks that a motion of an action ended after its cancellation, whether or not the server accepted the cancellation.
+fn check_cancelled<E>(ended: Option<&E>, action: &str) -> std::result::Result<(), String> {
+    match ended {
+        Some(_) => Ok(()),
+        None => Err(format!(
+            "{action} did not end the motion within {} s after its cancellation; the arm may still move",
+            ANSWER.as_secs()
+        )),
     }
 }
 
@@ -394,6 +406,16 @@ mod tests {
     fn an_object_that_another_client_released_is_not_held() {
         assert!(still_holds(Some(0.030), 0.031));
         assert!(!still_holds(Some(0.030), 0.080) && !still_holds(Some(0.030), 0.0) && !still_holds(None, 0.030));
+    }
+
+    #[test]
+    fn a_motion_that_goes_on_after_its_cancellation_is_not_reported_as_stopped() {
+        assert!(check_cancelled(Some(&GoalEnd::Aborted), "/follow").is_ok());
+        let why = check_cancelled::<GoalEnd>(None, "/follow").unwrap_err();
+        assert!(why.contains("/follow did not end the motion within 5 s"), "{why}");
+        let lost = RobotError::Lost { peer: "the arm".to_owned(), why };
+        let reported = more_serious(RobotError::Stopped(StopReason::Interrupted), Err(lost));
+        assert!(matches!(reported, RobotError::Lost { .. }), "{reported}");
     }
 
     #[test]
