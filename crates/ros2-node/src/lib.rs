@@ -60,11 +60,13 @@ pub fn run(
 ) -> Result<()> {
     let lines = Arc::<Lines>::default();
     let mut topics = Topics::open(&mut node, &lines)?;
-    let needs_lengths = !matches!(settings.camera_pose, CameraPoseSource::Unknown);
+    // A grasp by the arm needs lengths even if the pictures have no poses, as those of a camera on the hand.
+    let needs_lengths = arm.is_some() || !matches!(settings.camera_pose, CameraPoseSource::Unknown);
     let camera_pose = CameraPoseReader::open(&mut node, settings.camera_pose, settings.max_transform_age_secs, &lines)?;
     let reader = PictureReader::open(&mut node, settings.is_compressed, settings.picture_qos, settings.queue, &lines)?;
     let grasping = arm.map(|(grasp, arm)| Grasping::new(grasp, arm, Arc::clone(&reader.shared), is_interrupted));
-    let mut services = Services::open(&mut node, settings.teach, settings.trigger_teaching, grasping, &lines)?;
+    let (teach, trigger) = (settings.teach, settings.trigger_teaching);
+    let mut services = Services::open(&mut node, teach, trigger, needs_lengths, grasping, &lines)?;
     let mut searcher = Searcher::new(settings.model, settings.min_score, needs_lengths);
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
     while !is_interrupted() {

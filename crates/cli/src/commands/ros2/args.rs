@@ -6,7 +6,7 @@ use clap::Args;
 use sdg_ros2::Remapping;
 use sdg_ros2::dds::Rmw;
 
-use crate::shared_args::{ComputeArgs, ToldHeightArgs, positive, share};
+use crate::shared_args::{ComputeArgs, ToldHeightArgs, height_mm, positive, share};
 
 /// `sdg ros2`
 #[derive(Debug, Args)]
@@ -126,4 +126,8 @@ pub struct TeachTriggerArgs {
     /// The grasp model, by letter or name
     #[arg(long, value_name = "NAME", default_value = "C")]
     pub teach_model: String,
+    /// Height of the surface with the marks above the table, in a photo by the camera of --camera; needed with --camera
+    /// or --base-frame
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires_all = ["teach_demo", "camera"])]
+    pub teach_mark_height_mm: Option<f64>,
 }

@@ -23,7 +23,7 @@ pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
         model: args.teach_model.clone(),
         seed: TeachJob::DEFAULT_SEED,
         time_budget: None,
-        mark_height_mm: None,
+        mark_height_mm: args.teach_mark_height_mm,
         is_used: true,
     })
 }
