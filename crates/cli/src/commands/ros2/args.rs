@@ -99,7 +99,8 @@ pub struct ArmArgs {
     /// Topic of the arm's JointState messages
     #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
     pub joint_states: String,
-    /// Prefix of the names joint1 to joint7 and finger_joint1 to finger_joint2
+    /// Prefix of the names joint1 to joint7, finger_joint1 to finger_joint2 and, without --base-frame, of the frame link0
+    /// in responses
     #[arg(long, value_name = "PREFIX", default_value = "panda_")]
     pub joint_prefix: String,
     /// The gripper's position divided by its opening: 0.5 if the position is that of one finger, 1 if it is the opening

@@ -94,9 +94,14 @@ pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspInputs> {
     let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| needed("--camera"))?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
-    let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
+    let base_frame = arm_base_frame(args);
     let told = args.arm.height.told(workcell.table_height_m);
     Ok(GraspInputs { workcell, camera, told, speed: args.arm.speed, base_frame })
+}
+
+/// The frame of the poses in responses of the grasp service: by default, the arm's base link.
+fn arm_base_frame(args: &Ros2Args) -> String {
+    args.base_frame.clone().unwrap_or_else(|| format!("{}link0", args.arm.joint_prefix))
 }
 
 #[cfg(test)]
@@ -112,6 +117,17 @@ mod tests {
 
     fn parsed(line: &str) -> Result<Ros2Args, clap::Error> {
         Line::try_parse_from(line.split(' ')).map(|line| line.ros2)
+    }
+
+    #[test]
+    fn the_base_frame_has_the_prefix_of_the_joints() {
+        for (line, expected) in [
+            ("ros2", "panda_link0"),
+            ("ros2 --joint-prefix fr3_", "fr3_link0"),
+            ("ros2 --joint-prefix fr3_ --base-frame base", "base"),
+        ] {
+            assert_eq!(arm_base_frame(&parsed(line).unwrap()), expected);
+        }
     }
 
     #[test]
