@@ -57,7 +57,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     {
         return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
     }
-    let (camera, interrupt) = (args.camera.clone(), interrupt.clone());
+    let (camera, interrupt, teach_device) = (args.camera.clone(), interrupt.clone(), device.clone());
     Ok(Settings {
         model,
         device,
@@ -67,7 +67,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
         queue: args.queue as usize,
         is_compressed: args.ros.compressed,
         picture_qos: Qos { is_reliable: args.ros.reliable, depth: PICTURE_DEPTH, ..Qos::SENSORS },
-        teach: Arc::new(move |job| teach(job, camera.as_deref(), &interrupt)),
+        teach: Arc::new(move |job| teach(job, &teach_device, camera.as_deref(), &interrupt)),
         trigger_teaching: trigger_job(&args.teach),
     })
 }
