@@ -76,18 +76,20 @@ impl FromStr for TopicAddress {
     }
 }
 
-/// The domain of `ROS_DOMAIN_ID`; 0 if it is not set.
+/// The domain of `ROS_DOMAIN_ID`; 0 if it is empty or not set, as in ROS.
 ///
 /// # Errors
 /// An error text for an invalid domain.
 pub fn domain_of_environment() -> Result<u16, String> {
-    match std::env::var("ROS_DOMAIN_ID") {
-        Err(_) => Ok(0),
-        Ok(text) => {
-            let parsed = text.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
-            parsed.ok_or_else(|| format!("ROS_DOMAIN_ID: expected 0 to {MAX_DOMAIN}, found \"{text}\""))
-        }
+    domain_of(&std::env::var("ROS_DOMAIN_ID").unwrap_or_default())
+}
+
+fn domain_of(variable: &str) -> Result<u16, String> {
+    if variable.is_empty() {
+        return Ok(0);
     }
+    let parsed = variable.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
+    parsed.ok_or_else(|| format!("ROS_DOMAIN_ID: expected 0 to {MAX_DOMAIN}, found \"{variable}\""))
 }
 
 enum Pictures {
@@ -205,6 +207,12 @@ mod tests {
         {
             assert!(text.parse::<TopicAddress>().unwrap_err().contains(expected), "{text}");
         }
+    }
+
+    #[test]
+    fn an_empty_domain_is_the_default() {
+        assert_eq!((domain_of(""), domain_of("7")), (Ok(0), Ok(7)));
+        assert!(domain_of("233").is_err() && domain_of("x").is_err());
     }
 
     #[test]
