@@ -16,7 +16,8 @@ pub struct Frame {
     pub picture: RgbImage,
     /// Number assigned by the camera, from 0; a gap means that frames were not delivered.
     pub number: u64,
-    /// Capture time, or the arrival time if the camera provides none.
+    /// Capture time, or the arrival time if the camera provides none; for a picture requested over HTTP, the time before
+    /// the request.
     pub captured: SystemTime,
     /// The camera's address as given, without the password.
     pub camera: Arc<str>,

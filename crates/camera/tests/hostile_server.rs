@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use crate::support;
 use sdg_camera::{Camera, CameraError, Fault, OpenOptions};
@@ -316,6 +316,24 @@ fn snapshots_are_fetched_again_and_again_with_the_password() {
     }
     // After the first challenge, each request is authenticated.
     assert_eq!(refused.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn a_snapshot_counts_as_taken_before_its_request() {
+    let asked = Arc::new(Mutex::new(Vec::new()));
+    let log = Arc::clone(&asked);
+    let server = Server::start_with_requests(move |_, stream| {
+        log.lock().unwrap().push(SystemTime::now());
+        sleep(Duration::from_millis(50));
+        stream.write_all(b"HTTP/1.1 200 OK\r\nContent-Type: image/jpeg\r\n\r\n").unwrap();
+        stream.write_all(&jpeg(100)).unwrap();
+    });
+    let mut camera = open(&server.url("/shot.jpg"));
+    for idx in 0..2 {
+        let captured = camera.next_frame().unwrap().unwrap().captured;
+        let received = asked.lock().unwrap()[idx];
+        assert!(captured <= received, "{captured:?} {received:?}");
+    }
 }
 
 #[test]

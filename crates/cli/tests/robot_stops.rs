@@ -176,3 +176,9 @@ fn a_robot_that_goes_in_a_motion_is_one_line_and_its_last_second_is_kept() {
     assert_eq!(lines.len(), 2, "{stderr}");
     assert!(lines[1].starts_with(&format!("sdg: the connection to the robot at {address} is lost: ")), "{stderr}");
 }
+
+#[test]
+fn a_simulated_robot_whose_output_is_closed_ends_without_an_error() {
+    // Its standard output is closed after the first line, and it prints another one at the end.
+    assert_eq!(Simulated::start(&[]).interrupted(), Some(0));
+}

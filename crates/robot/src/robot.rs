@@ -2,7 +2,7 @@
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::{
-    ArmGeometry, CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, RoundedPath, Trajectory,
+    ArmGeometry, CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, RoundedPath, Trajectory,
 };
 
 use crate::arm::{Arm, CompliantArm};
@@ -157,12 +157,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// moves.
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
-        let apart = (trajectory.start() - state.q_commanded).abs();
-        let joint_idx = (0..NUM_JOINTS).find(|&idx| apart[idx].is_nan() || apart[idx] > MAX_START_DISTANCE_RAD);
-        if let Some(joint_idx) = joint_idx {
-            let (joint, apart_rad, max_rad) = (joint_idx + 1, apart[joint_idx], MAX_START_DISTANCE_RAD);
-            return Err(Violation::StartsElsewhere { joint, apart_rad, max_rad }.into());
-        }
+        Violation::check_start(trajectory.start(), &state.q_commanded, MAX_START_DISTANCE_RAD)?;
         let motion = self.limits_from(trajectory.start()).check(trajectory)?;
         self.watch.begin();
         let ended = match self.arm.follow(&motion, &mut self.watch) {

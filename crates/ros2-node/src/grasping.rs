@@ -115,6 +115,7 @@ impl Grasping {
             ..self.settings.workcell.grasp_config()
         };
         let mut arm = self.arm.take().context("the arm is lost")?;
+        arm.forget_reference();
         let (settings, is_interrupted) = (Arc::clone(&self.settings), Arc::clone(&self.is_interrupted));
         let mut finder = ModelFinder::new(model.clone(), camera, self.pictures.clone());
         if config.height.is_some() {

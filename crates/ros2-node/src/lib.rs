@@ -51,7 +51,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Runs the node until `is_interrupted` returns true.
 ///
 /// # Errors
-/// An error if a network resource cannot be opened; received data never ends the node.
+/// An error if a network resource cannot be opened, or if the system's clock was set back; received data never ends the
+/// node.
 pub fn run(
     mut node: Node,
     settings: Settings,
@@ -60,14 +61,16 @@ pub fn run(
 ) -> Result<()> {
     let lines = Arc::<Lines>::default();
     let mut topics = Topics::open(&mut node, &lines)?;
-    let needs_lengths = !matches!(settings.camera_pose, CameraPoseSource::Unknown);
+    // A grasp by the arm needs lengths even if the pictures have no poses, as those of a camera on the hand.
+    let needs_lengths = arm.is_some() || !matches!(settings.camera_pose, CameraPoseSource::Unknown);
     let camera_pose = CameraPoseReader::open(&mut node, settings.camera_pose, settings.max_transform_age_secs, &lines)?;
     let reader = PictureReader::open(&mut node, settings.is_compressed, settings.picture_qos, settings.queue, &lines)?;
     let grasping = arm.map(|(grasp, arm)| Grasping::new(grasp, arm, Arc::clone(&reader.shared), is_interrupted));
-    let mut services = Services::open(&mut node, settings.teach, settings.trigger_teaching, grasping, &lines)?;
+    let (teach, trigger) = (settings.teach, settings.trigger_teaching);
+    let mut services = Services::open(&mut node, teach, trigger, needs_lengths, grasping, &lines)?;
     let mut searcher = Searcher::new(settings.model, settings.min_score, needs_lengths);
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
-    while !is_interrupted() {
+    while !is_interrupted() && reader.shared.ended.get().is_none() {
         if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
             let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);
             match over_table.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
@@ -92,5 +95,8 @@ pub fn run(
         topics.diagnose(&reader, searcher.model().is_some());
     }
     services.finish();
-    Ok(())
+    match reader.shared.ended.get() {
+        Some(why) => anyhow::bail!("{why}"),
+        None => Ok(()),
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -22,7 +22,7 @@ pub(super) struct Picture {
     pub(super) header: Header,
     pub(super) picture: Arc<RgbImage>,
     pub(super) arrived: Instant,
-    /// Time of the stamp, or of the arrival if the stamp is from another clock.
+    /// Time of the stamp, or of the arrival if the stamp is later or from another clock.
     pub(super) captured: SystemTime,
 }
 
@@ -48,6 +48,8 @@ pub(super) struct Shared {
     is_stopped: AtomicBool,
     queue: usize,
     pub(super) counts: Counts,
+    /// The error after which no more pictures arrive.
+    pub(super) ended: OnceLock<RosError>,
 }
 
 impl Shared {
@@ -121,6 +123,7 @@ impl PictureReader {
             is_stopped: AtomicBool::new(false),
             queue,
             counts: Counts::default(),
+            ended: OnceLock::new(),
         });
         let topic = subscription.topic().to_owned();
         let (writer, lines) = (Arc::clone(&shared), Arc::clone(lines));
@@ -131,6 +134,10 @@ impl PictureReader {
                 match received {
                     Ok(Some(received)) => take(&writer, &lines, subscription.topic(), &received, read),
                     Ok(None) => {}
+                    Err(error @ RosError::ClockSetBack { .. }) => {
+                        let _ = writer.ended.set(error);
+                        return;
+                    }
                     Err(error) => {
                         writer.counts.refused.fetch_add(1, Ordering::Relaxed);
                         lines.complain(&error.to_string());

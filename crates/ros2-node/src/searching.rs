@@ -19,7 +19,7 @@ pub(super) struct Searcher {
     model: Option<GraspModel>,
     perception: Option<Perception>,
     min_score: f64,
-    /// Whether the pictures have camera poses, which a model without lengths cannot use.
+    /// Whether the pictures have camera poses or an arm grasps, for which a model without lengths cannot be used.
     needs_lengths: bool,
 }
 
@@ -54,8 +54,8 @@ impl Searcher {
     /// Replaces the model.
     ///
     /// # Errors
-    /// An error if the file is not a model, or if the model has no lengths although the pictures have camera poses; the
-    /// previous model then remains.
+    /// An error if the file is not a model, or if the model has no lengths although the node needs them; the previous
+    /// model then remains.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
         let model = sdg_inputs::read_model(path, device)?;
         if self.needs_lengths && model.facts().lengths.is_none() {

@@ -105,6 +105,8 @@ pub(super) struct Services {
     teaching: Option<(Client, Teaching)>,
     teach_with: Arc<Teach>,
     trigger_teaching: Option<TeachJob>,
+    /// Whether the node uses only models with lengths.
+    needs_lengths: bool,
     grasp: Option<(Pair<GraspRequest, GraspResponse>, Grasping)>,
     grasping: Option<Client>,
     lines: Arc<Lines>,
@@ -115,6 +117,7 @@ impl Services {
         node: &mut Node,
         teach_with: Arc<Teach>,
         trigger_teaching: Option<TeachJob>,
+        needs_lengths: bool,
         grasping: Option<Grasping>,
         lines: &Arc<Lines>,
     ) -> Result<Self, RosError> {
@@ -129,6 +132,7 @@ impl Services {
             teaching: None,
             teach_with,
             trigger_teaching,
+            needs_lengths,
             grasp,
             grasping: None,
             lines: Arc::clone(lines),
@@ -241,13 +245,15 @@ impl Services {
         for (asker, request) in self.teach.requests(&self.lines) {
             let begun = match (asker, request, &self.trigger_teaching) {
                 _ if self.teaching.is_some() => Err("a teaching is already running".to_owned()),
-                (Client::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
+                (Client::Trigger(_), Ok(_), Some(job)) => {
+                    Teaching::begin(job.clone(), &self.teach_with, self.needs_lengths)
+                        .map_err(|error| format!("{error:#}"))
+                }
                 (Client::Trigger(_), Ok(_), None) => {
                     Err("expected a node that was started with a demonstration and a file to teach".to_owned())
                 }
-                (_, Ok(request), _) => {
-                    Teaching::of_request(&request, &self.teach_with).map_err(|error| format!("{error:#}"))
-                }
+                (_, Ok(request), _) => Teaching::of_request(&request, &self.teach_with, self.needs_lengths)
+                    .map_err(|error| format!("{error:#}")),
                 (_, Err(error), _) => Err(error.to_string()),
             };
             match begun {

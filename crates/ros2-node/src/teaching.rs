@@ -71,6 +71,15 @@ impl TeachJob {
         };
         Ok((job, brought))
     }
+
+    /// Checks that the node can use the taught model. A job without a height teaches a model without lengths, and would
+    /// replace the file of the node's model if it has the same path.
+    fn check_usable(&self, needs_lengths: bool) -> Result<()> {
+        if self.is_used && needs_lengths && self.mark_height_mm.is_none() {
+            bail!("expected mark_height_mm, because this node uses only models with lengths, found none");
+        }
+        Ok(())
+    }
 }
 
 /// A running teaching.
@@ -87,16 +96,21 @@ impl Teaching {
     /// Begins teaching for a request.
     ///
     /// # Errors
-    /// An invalid request, or marks that cannot be written to a temporary file.
-    pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>) -> Result<Self> {
+    /// An invalid request, marks that cannot be written to a temporary file, and the errors of [`Self::begin`].
+    pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>, needs_lengths: bool) -> Result<Self> {
         let (job, marks) = TeachJob::read(request)?;
-        Ok(Self { _marks: marks, ..Self::begin(job, teach) })
+        Ok(Self { _marks: marks, ..Self::begin(job, teach, needs_lengths)? })
     }
 
-    pub(super) fn begin(job: TeachJob, teach: &Arc<Teach>) -> Self {
+    /// Begins teaching; `needs_lengths` is whether the node uses only models with lengths.
+    ///
+    /// # Errors
+    /// The node could not use the model.
+    pub(super) fn begin(job: TeachJob, teach: &Arc<Teach>, needs_lengths: bool) -> Result<Self> {
+        job.check_usable(needs_lengths)?;
         let (out, is_used, teach) = (job.out.clone(), job.is_used, Arc::clone(teach));
         let thread = std::thread::spawn(move || teach(&job).map_err(|error| one_line(&error)));
-        Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
+        Ok(Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None })
     }
 
     /// The model file and the duration in seconds, or the reason why there is no model; `None` while teaching is in progress.
@@ -128,5 +142,17 @@ mod tests {
         drop(brought);
         assert!(!marks.exists());
         assert!(TeachJob::read(&TeachRequest { out_path: String::new(), ..request }).is_err());
+    }
+
+    #[test]
+    fn a_model_without_lengths_is_not_taught_for_a_node_that_needs_them() {
+        let check = |use_it: bool, mark_height_mm: f64, needs_lengths: bool| {
+            let (photo_path, out_path) = ("part.png".to_owned(), "part.sdg".to_owned());
+            let request = TeachRequest { photo_path, out_path, use_it, mark_height_mm, ..TeachRequest::default() };
+            TeachJob::read(&request).unwrap().0.check_usable(needs_lengths)
+        };
+        let error = check(true, 0.0, true).unwrap_err().to_string();
+        assert!(error.contains("mark_height_mm"), "{error}");
+        assert!(check(true, 16.0, true).is_ok() && check(false, 0.0, true).is_ok() && check(true, 0.0, false).is_ok());
     }
 }

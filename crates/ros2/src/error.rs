@@ -22,6 +22,9 @@ pub enum RosError {
     /// No usable transform between two frames.
     #[error("no transform from \"{source_frame}\" to \"{target_frame}\": {why}")]
     Transform { target_frame: String, source_frame: String, why: String },
+    /// The system's clock was set back, so that RustDDS receives no best-effort messages for as long.
+    #[error("{topic}: the clock was set back by {secs:.0} s: restart the program")]
+    ClockSetBack { topic: String, secs: f64 },
     /// The network reported an error.
     #[error("{what}: {why}")]
     Network { what: String, why: String },

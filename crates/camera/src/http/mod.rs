@@ -16,7 +16,7 @@ mod snapshots;
 mod url;
 mod waiting;
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use image::RgbImage;
 
@@ -30,11 +30,12 @@ pub use url::Url;
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
     let refused = |why: String| CameraError::Open { address: url.to_string(), why };
     let mut login = exchange::Login::default();
+    let asked = SystemTime::now();
     let answer = exchange::get(url, &mut login, deadline).map_err(refused)?;
     let kind = answer.content_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
     match kind.as_str() {
         "image/jpeg" | "image/jpg" | "image/png" => {
-            Ok(Box::new(snapshots::Snapshots::new(url.clone(), login, answer, options)))
+            Ok(Box::new(snapshots::Snapshots::new(url.clone(), login, (asked, answer), options)))
         }
         _ if kind.starts_with("multipart/") => {
             let source =

@@ -16,15 +16,15 @@ use crate::source::{Missing, Source, Taken};
 pub(super) struct Snapshots {
     url: Url,
     login: Login,
-    /// The response by which the server was recognised as one of single pictures.
-    first: Option<Answer>,
+    /// The response by which the server was recognised as one of single pictures, and the time before its request.
+    first: Option<(SystemTime, Answer)>,
     interval: Duration,
     next_at: Instant,
     frame: PixelFrame,
 }
 
 impl Snapshots {
-    pub(super) fn new(url: Url, login: Login, first: Answer, options: &OpenOptions) -> Self {
+    pub(super) fn new(url: Url, login: Login, first: (SystemTime, Answer), options: &OpenOptions) -> Self {
         let fps = options.fps.unwrap_or(OpenOptions::DEFAULT_SNAPSHOT_FPS);
         Self {
             url,
@@ -44,9 +44,11 @@ impl Source for Snapshots {
         // Waiting for the requested interval is not a delay of the camera.
         let deadline = deadline + wait;
         self.next_at = Instant::now() + self.interval;
-        let mut answer = match self.first.take() {
-            Some(answer) => answer,
-            None => get(&self.url, &mut self.login, deadline).map_err(Missing::Gone)?,
+        // A server may take the picture as soon as it receives the request, long before the picture arrives.
+        let asked = SystemTime::now();
+        let (captured, mut answer) = match self.first.take() {
+            Some(first) => first,
+            None => (asked, get(&self.url, &mut self.login, deadline).map_err(Missing::Gone)?),
         };
         if !answer.content_type.trim_start().to_ascii_lowercase().starts_with("image/") {
             return Err(Missing::Gone(format!("expected a picture, found {}", answer.content_type)));
@@ -66,7 +68,6 @@ impl Source for Snapshots {
                 Err(why) => return Err(Missing::Torn(format!("{} bytes, then: {why}", bytes.len()))),
             }
         }
-        let captured = SystemTime::now();
         let picture = decode(&bytes, self.frame).map_err(Missing::Torn)?;
         Ok(Some(Taken { picture, captured, num_skipped: 0 }))
     }

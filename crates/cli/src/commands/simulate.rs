@@ -1,5 +1,6 @@
 //! `sdg simulate --fci`: a simulated Panda in MuJoCo on the network, for any client of the Franka Control Interface.
 
+use std::io::Write;
 use std::net::IpAddr;
 use std::thread;
 use std::time::Duration;
@@ -61,22 +62,24 @@ pub fn run(args: &SimulateArgs) -> Result<Outcome> {
     };
     let server = Server::start(plant, &config).context("sdg simulate")?;
     let (robot, hand) = (server.robot_address(), server.hand_address());
-    if args.json {
-        println!("{}", json!({ "robot": robot, "hand": hand, "lockstep": args.lockstep }));
-    } else {
-        println!("a simulated Panda: robot on {robot}, hand on {hand}; Ctrl-C ends it");
-    }
+    // A program may send Ctrl-C as soon as it has read the addresses.
     let interrupt = Interrupt::watch();
+    let mut stdout = std::io::stdout();
+    if args.json {
+        writeln!(stdout, "{}", json!({ "robot": robot, "hand": hand, "lockstep": args.lockstep }))?;
+    } else {
+        writeln!(stdout, "a simulated Panda: robot on {robot}, hand on {hand}; Ctrl-C ends it")?;
+    }
     while !interrupt.is_requested() && server.is_running() {
         thread::sleep(POLL_INTERVAL);
     }
     let statistics = server.statistics();
     server.stop()?;
-    report(&statistics, args.json);
+    report(&statistics, args.json, &mut stdout)?;
     Ok(Outcome::Done)
 }
 
-fn report(statistics: &ServerStatistics, as_json: bool) {
+fn report(statistics: &ServerStatistics, as_json: bool, stdout: &mut impl Write) -> std::io::Result<()> {
     let ServerStatistics { num_motions, num_motion_cycles, num_commands, num_late, num_invalid, num_stalls, .. } =
         *statistics;
     let latest_ms = statistics.max_lateness.as_secs_f64() * 1e3;
@@ -86,11 +89,11 @@ fn report(statistics: &ServerStatistics, as_json: bool) {
             "commands_late": num_late, "datagrams_invalid": num_invalid, "stalls_over_20_ms": num_stalls,
             "latest_cycle_ms": latest_ms,
         });
-        println!("{counted}");
-        return;
+        return writeln!(stdout, "{counted}");
     }
-    println!(
+    writeln!(
+        stdout,
         "{num_motions} motions; {num_commands} of {num_motion_cycles} cycles answered in time, {num_late} commands late; \
          {num_stalls} stalls over 20 ms, the longest {latest_ms:.1} ms"
-    );
+    )
 }

@@ -32,6 +32,14 @@ impl Simulated {
         assert!(line.contains(&port), "{line}");
         Self { child, address: format!("127.0.0.1:{port}") }
     }
+
+    /// The exit code after Ctrl-C.
+    #[cfg(unix)]
+    pub fn interrupted(mut self) -> Option<i32> {
+        let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        self.child.wait().unwrap().code()
+    }
 }
 
 impl Drop for Simulated {

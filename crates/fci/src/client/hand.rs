@@ -50,14 +50,14 @@ impl HandStopHandle {
 }
 
 impl Hand {
-    /// Connects to the hand of a robot by name or IP address.
+    /// Connects to the hand of a robot by name or IP address, as [`super::Robot::connect`].
     ///
     /// # Errors
     /// [`FciError::Socket`]; [`FciError::Version`] for a hand with another protocol version; [`FciError::Timeout`] or
     /// [`FciError::Closed`] if the hand does not answer; [`FciError::Wire`] or [`FciError::Refused`] for an answer that
     /// is invalid or has no version.
     pub fn connect(host: &str, config: &HandConfig) -> Result<Self> {
-        let mut session = Session::connect(resolve(host, config.port)?, HeaderKind::Hand, config.timeout)?;
+        let mut session = Session::connect(&resolve(host, config.port)?, HeaderKind::Hand, config.timeout)?;
         let request = HandRequest::Connect { version: HAND_VERSION, udp_port: session.udp_port()? };
         let id = session.sending.send(|id| request.encode(id))?;
         let payload = session.wait_for(id, request.command().name(), Some(config.timeout))?;

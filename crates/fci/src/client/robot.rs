@@ -65,27 +65,28 @@ impl StopHandle {
 }
 
 impl Robot {
-    /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state.
+    /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state. Of several
+    /// addresses of a name, the first that accepts the connection is used.
     ///
     /// # Errors
     /// [`FciError::Socket`]; [`FciError::Version`] for a robot with an unsupported protocol version;
     /// [`FciError::Timeout`] if no response or no state arrives (the latter often because a firewall blocks UDP);
     /// [`FciError::Closed`]; [`FciError::Wire`] for an invalid message.
     pub fn connect(host: &str, config: &RobotConfig) -> Result<Self> {
-        let address = resolve(host, config.port)?;
+        let addresses = resolve(host, config.port)?;
         match config.version {
-            Some(version) => Self::connect_as(address, version, config.timeout),
-            None => match Self::connect_as(address, Version::V5, config.timeout) {
+            Some(version) => Self::connect_as(&addresses, version, config.timeout),
+            None => match Self::connect_as(&addresses, Version::V5, config.timeout) {
                 Err(FciError::Version { found, .. }) if found == Version::V10.number() => {
-                    Self::connect_as(address, Version::V10, config.timeout)
+                    Self::connect_as(&addresses, Version::V10, config.timeout)
                 }
                 other => other,
             },
         }
     }
 
-    fn connect_as(address: SocketAddr, version: Version, timeout: Duration) -> Result<Self> {
-        let mut session = Session::connect(address, HeaderKind::Robot, timeout)?;
+    fn connect_as(addresses: &[SocketAddr], version: Version, timeout: Duration) -> Result<Self> {
+        let mut session = Session::connect(addresses, HeaderKind::Robot, timeout)?;
         let request = Request::Connect { version: version.number(), udp_port: session.udp_port()? };
         let response = execute(&mut session, &request, version, Some(timeout))?;
         let found = match response.rest[..] {
@@ -265,14 +266,17 @@ fn accept(response: &Response, command: Command) -> Result<()> {
     }
 }
 
-/// The first address of a host, or of a host with its own port (`HOST:PORT`).
-pub(super) fn resolve(host: &str, port: u16) -> Result<SocketAddr> {
+/// The addresses of a host, or of a host with its own port (`HOST:PORT`); at least one.
+pub(super) fn resolve(host: &str, port: u16) -> Result<Vec<SocketAddr>> {
     let (host, port) = match host.rsplit_once(':').map(|(name, port)| (name, port.parse())) {
         // An IPv6 address has more than one colon.
         Some((name, Ok(own_port))) if !name.contains(':') => (name, own_port),
         _ => (host, port),
     };
     let unknown = |source| FciError::Socket { action: "find", address: host.to_owned(), source };
-    let mut addresses = (host, port).to_socket_addrs().map_err(unknown)?;
-    addresses.next().ok_or_else(|| unknown(std::io::ErrorKind::NotFound.into()))
+    let addresses: Vec<SocketAddr> = (host, port).to_socket_addrs().map_err(unknown)?.collect();
+    if addresses.is_empty() {
+        return Err(unknown(std::io::ErrorKind::NotFound.into()));
+    }
+    Ok(addresses)
 }

@@ -56,10 +56,10 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// Connects. `timeout` limits connecting, sending and each wait for a state; [`Self::wait_for`] has its own limit.
-    pub(crate) fn connect(address: SocketAddr, kind: HeaderKind, timeout: Duration) -> Result<Self> {
-        let stream = TcpStream::connect_timeout(&address, timeout)
-            .map_err(|source| socket_error("connect to", address, source))?;
+    /// Connects to the first of a host's addresses that accepts the connection. `timeout` limits connecting, sending and
+    /// each wait for a state; [`Self::wait_for`] has its own limit.
+    pub(crate) fn connect(addresses: &[SocketAddr], kind: HeaderKind, timeout: Duration) -> Result<Self> {
+        let (address, stream) = connect_first(addresses, timeout)?;
         let settings = || -> std::io::Result<(TcpStream, UdpSocket)> {
             stream.set_nodelay(true)?;
             stream.set_write_timeout(Some(timeout))?;
@@ -267,6 +267,26 @@ impl Drop for Session {
     }
 }
 
+/// Connects to the first address that accepts the connection, for example to the second one of `localhost` if the server
+/// has no IPv6. Each address gets an equal share of the time left.
+///
+/// # Errors
+/// The error of the last address.
+fn connect_first(addresses: &[SocketAddr], timeout: Duration) -> Result<(SocketAddr, TcpStream)> {
+    let deadline = Instant::now() + timeout;
+    let source = ErrorKind::NotFound.into();
+    let mut failed = FciError::Socket { action: "find", address: "an address".to_owned(), source };
+    for (idx, &address) in addresses.iter().enumerate() {
+        let left = deadline.saturating_duration_since(Instant::now()) / (addresses.len() - idx) as u32;
+        // A wait of zero is not allowed.
+        match TcpStream::connect_timeout(&address, left.max(Duration::from_millis(1))) {
+            Ok(stream) => return Ok((address, stream)),
+            Err(source) => failed = socket_error("connect to", address, source),
+        }
+    }
+    Err(failed)
+}
+
 fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &SyncSender<Incoming>) {
     loop {
         match read_message(&mut stream, kind) {
@@ -292,3 +312,21 @@ pub(crate) fn socket_error(action: &'static str, address: SocketAddr, source: st
 
 #[cfg(test)]
 mod schedules;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    #[test]
+    fn the_first_address_that_accepts_the_connection_is_used() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let open = listener.local_addr().unwrap();
+        // No program listens at these addresses of this computer.
+        let [closed, last] = [2, 3].map(|host| SocketAddr::from(([127, 0, 0, host], open.port())));
+        let (address, _stream) = connect_first(&[closed, open, last], Duration::from_secs(5)).unwrap();
+        assert_eq!(address, open);
+        let error = connect_first(&[closed, last], Duration::from_secs(5)).unwrap_err().to_string();
+        assert!(error.contains(&last.to_string()), "{error}");
+    }
+}

@@ -1,5 +1,7 @@
 //! The limit that a motion violates.
 
+use sdg_kinematics::{JointVector, NUM_JOINTS};
+
 use crate::safety::self_collision::SelfCollision;
 
 /// The first limit that a motion violates; times in seconds from the motion's start.
@@ -80,4 +82,18 @@ pub enum Violation {
     /// The arm comes too close to itself.
     #[error("at {time_secs:.3} s {collision}")]
     SelfCollision { time_secs: f64, collision: SelfCollision },
+}
+
+impl Violation {
+    /// Checks that a motion starts at most `max_rad` from a position of the arm, in each joint.
+    ///
+    /// # Errors
+    /// [`Violation::StartsElsewhere`] for the first joint that is farther away or has no position.
+    pub fn check_start(start: &JointVector, q: &JointVector, max_rad: f64) -> Result<(), Self> {
+        let apart = (start - q).abs();
+        match (0..NUM_JOINTS).find(|&idx| apart[idx].is_nan() || apart[idx] > max_rad) {
+            None => Ok(()),
+            Some(idx) => Err(Self::StartsElsewhere { joint: idx + 1, apart_rad: apart[idx], max_rad }),
+        }
+    }
 }

@@ -264,7 +264,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
     /// Fails if the hand holds an object: the sequence opens the hand in the air, and the object would fall.
     fn check_hand(&mut self) -> Steps<()> {
         if self.robot.hand()?.is_grasping {
-            let why = "the hand still holds an object: first open it, with sdg robot open".to_owned();
+            let why = "the hand still holds an object: open it first".to_owned();
             return Err(Stop::Failed(GraspStep::Detect, why));
         }
         Ok(())

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use sdg_robot::{
     Arm, ArmGeometry, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load,
-    MAX_WIDTH_CHANGE_M, MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Watch,
+    MAX_WIDTH_CHANGE_M, MIN_HELD_WIDTH_M, MotionEnd, RobotError, StopReason, Violation, Watch,
 };
 
 use super::action::{ActionClient, ActionType, Goal, GoalEnd};
@@ -41,6 +41,9 @@ const MAX_STATE_AGE: Duration = Duration::from_millis(500);
 /// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 states per second, and networks delay
 /// them.
 const MAX_SILENCE_SECS: f64 = 0.5;
+/// Largest distance of a motion's start from the measured position, rad: above the deviations that controllers accept at
+/// the end of a motion. From farther away the controller would jump to the start.
+const MAX_START_DISTANCE_RAD: f64 = 0.05;
 /// Interval of checks while hand or arm moves.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
@@ -92,6 +95,12 @@ impl TrajectoryArm {
     /// Number of feedback messages received with motions.
     pub fn num_feedback(&self) -> u64 {
         self.num_feedback
+    }
+
+    /// Forgets the end of the last motion, so that the next motion starts at the measured position: since then another
+    /// client or a person may have moved the arm.
+    pub fn forget_reference(&mut self) {
+        self.commanded = None;
     }
 
     fn lost(&self, why: impl ToString) -> RobotError {
@@ -177,10 +186,22 @@ impl TrajectoryArm {
 
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
-        self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
+        let ended = self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
+        check_cancelled(ended.as_ref(), self.motions.name()).map_err(|why| self.lost(why))?;
         // The controller holds the position at which the arm stopped.
-        self.commanded = None;
+        self.forget_reference();
         Ok(())
+    }
+}
+
+/// Checks that a motion of an action ended after its cancellation, whether or not the server accepted the cancellation.
+fn check_cancelled<E>(ended: Option<&E>, action: &str) -> std::result::Result<(), String> {
+    match ended {
+        Some(_) => Ok(()),
+        None => Err(format!(
+            "{action} did not end the motion within {} s after its cancellation; the arm may still move",
+            ANSWER.as_secs()
+        )),
     }
 }
 
@@ -191,6 +212,11 @@ fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
         (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,
         (error, _) => error,
     }
+}
+
+/// Checks that a motion starts near the arm's measured position.
+fn check_start(start: &Joints, measured: &Joints) -> Result<()> {
+    Ok(Violation::check_start(start, measured, MAX_START_DISTANCE_RAD)?)
 }
 
 /// The motion's positions, velocities and accelerations at regular times, including its end.
@@ -239,6 +265,7 @@ impl Arm for TrajectoryArm {
 
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
         watch.allow_silence(MAX_SILENCE_SECS);
+        check_start(motion.start(), &self.known()?.q)?;
         let goal =
             FollowJointTrajectoryGoal { trajectory: trajectory(motion, &self.config.joints), ..Default::default() };
         let sent = self.motions.send(goal, ANSWER).map_err(|error| self.lost(error))?;
@@ -246,7 +273,7 @@ impl Arm for TrajectoryArm {
             let action = self.motions.name();
             return Err(RobotError::Device(format!("{action} refused the trajectory").into()));
         };
-        self.commanded = None;
+        self.forget_reference();
         let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
         let (end, result) = match self.motion_end(&mut goal, deadline, watch) {
             Ok(ended) => ended,
@@ -360,7 +387,7 @@ impl Arm for TrajectoryArm {
     /// Recovers nothing, because errors are recovered at the arm's driver. Forgets the commanded position, and checks
     /// that joint states arrive.
     fn recover(&mut self) -> Result<()> {
-        self.commanded = None;
+        self.forget_reference();
         self.known().map(drop)
     }
 }
@@ -379,5 +406,27 @@ mod tests {
     fn an_object_that_another_client_released_is_not_held() {
         assert!(still_holds(Some(0.030), 0.031));
         assert!(!still_holds(Some(0.030), 0.080) && !still_holds(Some(0.030), 0.0) && !still_holds(None, 0.030));
+    }
+
+    #[test]
+    fn a_motion_that_goes_on_after_its_cancellation_is_not_reported_as_stopped() {
+        assert!(check_cancelled(Some(&GoalEnd::Aborted), "/follow").is_ok());
+        let why = check_cancelled::<GoalEnd>(None, "/follow").unwrap_err();
+        assert!(why.contains("/follow did not end the motion within 5 s"), "{why}");
+        let lost = RobotError::Lost { peer: "the arm".to_owned(), why };
+        let reported = more_serious(RobotError::Stopped(StopReason::Interrupted), Err(lost));
+        assert!(matches!(reported, RobotError::Lost { .. }), "{reported}");
+    }
+
+    #[test]
+    fn a_motion_from_where_the_arm_is_not_is_refused() {
+        let start = Joints::zeros();
+        let measured = |joint_rad: f64| Joints::from_fn(|idx, _| if idx == 3 { joint_rad } else { 0.0 });
+        assert!(check_start(&start, &measured(0.04)).is_ok() && check_start(&start, &measured(-0.04)).is_ok());
+        for joint_rad in [0.06, -0.06, f64::NAN] {
+            let error = check_start(&start, &measured(joint_rad)).unwrap_err();
+            let is_joint_4 = matches!(&error, RobotError::Unsafe(Violation::StartsElsewhere { joint: 4, .. }));
+            assert!(is_joint_4 && !error.latches(), "{error}");
+        }
     }
 }

@@ -76,18 +76,20 @@ impl FromStr for TopicAddress {
     }
 }
 
-/// The domain of `ROS_DOMAIN_ID`; 0 if it is not set.
+/// The domain of `ROS_DOMAIN_ID`; 0 if it is empty or not set, as in ROS.
 ///
 /// # Errors
 /// An error text for an invalid domain.
 pub fn domain_of_environment() -> Result<u16, String> {
-    match std::env::var("ROS_DOMAIN_ID") {
-        Err(_) => Ok(0),
-        Ok(text) => {
-            let parsed = text.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
-            parsed.ok_or_else(|| format!("ROS_DOMAIN_ID: expected 0 to {MAX_DOMAIN}, found \"{text}\""))
-        }
+    domain_of(&std::env::var("ROS_DOMAIN_ID").unwrap_or_default())
+}
+
+fn domain_of(variable: &str) -> Result<u16, String> {
+    if variable.is_empty() {
+        return Ok(0);
     }
+    let parsed = variable.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
+    parsed.ok_or_else(|| format!("ROS_DOMAIN_ID: expected 0 to {MAX_DOMAIN}, found \"{variable}\""))
 }
 
 enum Pictures {
@@ -179,14 +181,15 @@ impl Camera for RosCamera {
     }
 }
 
-/// The time at which a picture was taken; now, if the stamp comes from another clock.
+/// The time at which a picture was taken; now, if the stamp comes from another clock. It is never later than now, because
+/// a picture that was taken before the arm stopped must not seem to be taken after it.
 pub fn stamp_or_now(stamp: Time) -> SystemTime {
     let now = SystemTime::now();
     let is_near = |time: &SystemTime| {
         let apart = now.duration_since(*time).or_else(|_| time.duration_since(now));
         apart.is_ok_and(|apart| apart < MAX_STAMP_AGE)
     };
-    stamp.to_system().filter(is_near).unwrap_or(now)
+    stamp.to_system().filter(is_near).map_or(now, |time| time.min(now))
 }
 
 #[cfg(test)]
@@ -207,6 +210,12 @@ mod tests {
     }
 
     #[test]
+    fn an_empty_domain_is_the_default() {
+        assert_eq!((domain_of(""), domain_of("7")), (Ok(0), Ok(7)));
+        assert!(domain_of("233").is_err() && domain_of("x").is_err());
+    }
+
+    #[test]
     fn stamps_of_another_clock_are_the_time_of_arrival() {
         let now = SystemTime::now();
         let second_ago = now - Duration::from_secs(1);
@@ -215,5 +224,11 @@ mod tests {
         for other in [Time { sec: 5, nanosec: 0 }, Time { sec: -1, nanosec: 0 }, Time { sec: 5, nanosec: u32::MAX }] {
             assert!(stamp_or_now(other) >= now);
         }
+    }
+
+    #[test]
+    fn a_stamp_in_the_future_is_the_time_of_arrival() {
+        let read = stamp_or_now(Time::from_system(SystemTime::now() + Duration::from_secs(2)));
+        assert!(read <= SystemTime::now());
     }
 }

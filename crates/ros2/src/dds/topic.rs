@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use ros2_client::Gid;
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
@@ -55,6 +55,8 @@ impl Qos {
 
 /// Maximum number of senders for which the number of the last message is stored.
 const MAX_SENDERS: usize = 64;
+/// Largest step back of the system's clock that is not reported: messages are delayed by it.
+const MAX_CLOCK_STEP: Duration = Duration::from_secs(1);
 
 /// Receives a topic's messages.
 pub struct Subscription<T: Cdr + 'static> {
@@ -62,6 +64,8 @@ pub struct Subscription<T: Cdr + 'static> {
     inner: ros2_client::Subscription<Wire<T>>,
     last_numbers: Mutex<HashMap<Gid, i64>>,
     num_lost: AtomicU64,
+    /// The time of the last call of [`Self::receive`].
+    last_call: Mutex<(SystemTime, Instant)>,
 }
 
 /// A message, and its time of arrival.
@@ -75,7 +79,8 @@ pub struct Received<T> {
 
 impl<T: Cdr + 'static> Subscription<T> {
     pub(super) fn new(topic: String, inner: ros2_client::Subscription<Wire<T>>) -> Self {
-        Self { topic, inner, last_numbers: Mutex::default(), num_lost: AtomicU64::new(0) }
+        let last_call = Mutex::new((SystemTime::now(), Instant::now()));
+        Self { topic, inner, last_numbers: Mutex::default(), num_lost: AtomicU64::new(0), last_call }
     }
 
     /// The topic's absolute name.
@@ -87,8 +92,9 @@ impl<T: Cdr + 'static> Subscription<T> {
     ///
     /// # Errors
     /// [`RosError::Malformed`] for an invalid message of this type; the next call continues with the next message.
-    /// Errors reported by the network.
+    /// [`RosError::ClockSetBack`], once for each step of the clock. Errors reported by the network.
     pub fn receive(&self, timeout: Duration) -> Result<Option<Received<T>>, RosError> {
+        self.check_clock()?;
         let Some(taken) = wait_for(self.inner.async_take(), Some(Instant::now() + timeout)) else { return Ok(None) };
         let arrived = Instant::now();
         let (Wire(message), info) = taken.map_err(|error| network(&self.topic, error))?;
@@ -96,6 +102,17 @@ impl<T: Cdr + 'static> Subscription<T> {
         match message {
             Ok(message) => Ok(Some(Received { message, arrived })),
             Err(source) => Err(RosError::Malformed { topic: self.topic.clone(), source }),
+        }
+    }
+
+    /// Checks that the system's clock was not set back since the last call. RustDDS orders messages by the time of their
+    /// arrival, and gives a best-effort reader only those up to now.
+    fn check_clock(&self) -> Result<(), RosError> {
+        let now = (SystemTime::now(), Instant::now());
+        let mut last_call = self.last_call.lock().unwrap_or_else(PoisonError::into_inner);
+        match clock_step(std::mem::replace(&mut *last_call, now), now) {
+            Some(back) => Err(RosError::ClockSetBack { topic: self.topic.clone(), secs: back.as_secs_f64() }),
+            None => Ok(()),
         }
     }
 
@@ -117,6 +134,13 @@ impl<T: Cdr + 'static> Subscription<T> {
             );
         }
     }
+}
+
+/// The time by which the system's clock was set back between two readings of both clocks; `None` up to
+/// [`MAX_CLOCK_STEP`].
+fn clock_step(before: (SystemTime, Instant), now: (SystemTime, Instant)) -> Option<Duration> {
+    let expected = before.0.checked_add(now.1.duration_since(before.1))?;
+    expected.duration_since(now.0).ok().filter(|back| *back > MAX_CLOCK_STEP)
 }
 
 /// Sends messages to a topic.
@@ -145,5 +169,22 @@ impl<T: Cdr> Publisher<T> {
     /// [`RosError::Network`] if the queue of a reliable reader stays full.
     pub fn send(&self, message: T) -> Result<(), RosError> {
         self.inner.publish(Wire(Ok(message))).map_err(|error| network(&self.topic, error.forget_data()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_back_is_noticed() {
+        let before = (SystemTime::now(), Instant::now());
+        let elapsed = Duration::from_secs(10);
+        let now = |system: SystemTime| (system, before.1 + elapsed);
+        let (on_time, hours) = (before.0 + elapsed, Duration::from_secs(7200));
+        assert_eq!(clock_step(before, now(on_time - hours)), Some(hours));
+        for system in [on_time, on_time - Duration::from_millis(500), on_time + hours] {
+            assert_eq!(clock_step(before, now(system)), None);
+        }
     }
 }

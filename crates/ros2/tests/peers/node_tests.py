@@ -195,7 +195,8 @@ def pictures_at(sdg, model, best, kind, rate, qos, option):
 def services(sdg, folder):
     model = teach(sdg, folder, f"--camera={CAMERA}", "--mark-height-mm=16")
     domain, second = 42, folder / "taught.sdg"
-    options = [f"--grasp-model={model}", f"--camera={CAMERA}", f"--teach-demo={PHOTO}:{MARKS}", f"--teach-out={second}", "--teach-model=S"]
+    options = [f"--grasp-model={model}", f"--camera={CAMERA}", f"--teach-demo={PHOTO}:{MARKS}", f"--teach-out={second}", "--teach-model=S",
+               "--teach-mark-height-mm=16"]
     with Sdg(sdg, domain, *options):
         peer = Peer(domain)
         send = peer.writer("/image", "sensor_msgs/msg/Image", best_effort(5))

@@ -6,7 +6,7 @@ use clap::Args;
 use sdg_ros2::Remapping;
 use sdg_ros2::dds::Rmw;
 
-use crate::shared_args::{ComputeArgs, ToldHeightArgs, positive, share};
+use crate::shared_args::{ComputeArgs, ToldHeightArgs, height_mm, positive, share};
 
 /// `sdg ros2`
 #[derive(Debug, Args)]
@@ -99,7 +99,8 @@ pub struct ArmArgs {
     /// Topic of the arm's JointState messages
     #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
     pub joint_states: String,
-    /// Prefix of the names joint1 to joint7 and finger_joint1 to finger_joint2
+    /// Prefix of the names joint1 to joint7, finger_joint1 to finger_joint2 and, without --base-frame, of the frame link0
+    /// in responses
     #[arg(long, value_name = "PREFIX", default_value = "panda_")]
     pub joint_prefix: String,
     /// The gripper's position divided by its opening: 0.5 if the position is that of one finger, 1 if it is the opening
@@ -126,4 +127,8 @@ pub struct TeachTriggerArgs {
     /// The grasp model, by letter or name
     #[arg(long, value_name = "NAME", default_value = "C")]
     pub teach_model: String,
+    /// Height of the surface with the marks above the table, in a photo by the camera of --camera; needed with --camera
+    /// or --base-frame
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires_all = ["teach_demo", "camera"])]
+    pub teach_mark_height_mm: Option<f64>,
 }

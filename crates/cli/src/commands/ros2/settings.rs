@@ -22,9 +22,10 @@ const PICTURE_DEPTH: usize = 10;
 /// Reads the files of the node.
 ///
 /// # Errors
-/// A file cannot be used; a table height is given without a base frame; a model without lengths is given, although the
-/// camera's pose is known.
+/// A file cannot be used; a table height is given without a base frame; a model without lengths is given or is to be
+/// taught, although the camera's pose is known.
 pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
+    check_trigger(args)?;
     let device = devices::open(&args.compute)?;
     let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
     if args.table_height_mm.is_some() && args.base_frame.is_none() {
@@ -56,7 +57,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     {
         return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
     }
-    let (camera, interrupt) = (args.camera.clone(), interrupt.clone());
+    let (camera, interrupt, teach_device) = (args.camera.clone(), interrupt.clone(), device.clone());
     Ok(Settings {
         model,
         device,
@@ -66,9 +67,19 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
         queue: args.queue as usize,
         is_compressed: args.ros.compressed,
         picture_qos: Qos { is_reliable: args.ros.reliable, depth: PICTURE_DEPTH, ..Qos::SENSORS },
-        teach: Arc::new(move |job| teach(job, camera.as_deref(), &interrupt)),
+        teach: Arc::new(move |job| teach(job, &teach_device, camera.as_deref(), &interrupt)),
         trigger_teaching: trigger_job(&args.teach),
     })
+}
+
+/// Checks that `~/teach_trigger` teaches a model with lengths if the node needs them.
+fn check_trigger(args: &Ros2Args) -> Result<(), Usage> {
+    let needs_lengths = args.camera.is_some() || args.base_frame.is_some();
+    if args.teach.teach_demo.is_some() && needs_lengths && args.teach.teach_mark_height_mm.is_none() {
+        let why = "a node with --camera or --base-frame uses only models with lengths";
+        return Err(Usage(format!("--teach-demo: expected --camera and --teach-mark-height-mm, because {why}")));
+    }
+    Ok(())
 }
 
 /// Reads and checks the workcell and the camera of the grasp service, and checks the speed.
@@ -83,7 +94,52 @@ pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspInputs> {
     let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| needed("--camera"))?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
-    let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
+    let base_frame = arm_base_frame(args);
     let told = args.arm.height.told(workcell.table_height_m);
     Ok(GraspInputs { workcell, camera, told, speed: args.arm.speed, base_frame })
+}
+
+/// The frame of the poses in responses of the grasp service: by default, the arm's base link.
+fn arm_base_frame(args: &Ros2Args) -> String {
+    args.base_frame.clone().unwrap_or_else(|| format!("{}link0", args.arm.joint_prefix))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        ros2: Ros2Args,
+    }
+
+    fn parsed(line: &str) -> Result<Ros2Args, clap::Error> {
+        Line::try_parse_from(line.split(' ')).map(|line| line.ros2)
+    }
+
+    #[test]
+    fn the_base_frame_has_the_prefix_of_the_joints() {
+        for (line, expected) in [
+            ("ros2", "panda_link0"),
+            ("ros2 --joint-prefix fr3_", "fr3_link0"),
+            ("ros2 --joint-prefix fr3_ --base-frame base", "base"),
+        ] {
+            assert_eq!(arm_base_frame(&parsed(line).unwrap()), expected);
+        }
+    }
+
+    #[test]
+    fn the_trigger_of_a_node_that_needs_lengths_has_a_height_of_marks() {
+        let teach = "ros2 --teach-demo part.png --teach-out part.sdg";
+        for needs in ["--camera camera.yaml", "--base-frame panda_link0"] {
+            let error = check_trigger(&parsed(&format!("{teach} {needs}")).unwrap()).unwrap_err().to_string();
+            assert!(error.contains("--teach-mark-height-mm"), "{error}");
+        }
+        for line in [teach.to_owned(), format!("{teach} --camera camera.yaml --teach-mark-height-mm 16")] {
+            check_trigger(&parsed(&line).unwrap()).unwrap();
+        }
+        assert!(parsed(&format!("{teach} --teach-mark-height-mm 16")).is_err(), "the height needs a camera");
+    }
 }

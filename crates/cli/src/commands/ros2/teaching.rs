@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use sdg_grasp::TeachOptions;
+use sdg_grasp::{Device, TeachOptions};
 use sdg_inputs::TeachingFiles;
 use sdg_ros2_node::TeachJob;
 
@@ -23,16 +23,25 @@ pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
         model: args.teach_model.clone(),
         seed: TeachJob::DEFAULT_SEED,
         time_budget: None,
-        mark_height_mm: None,
+        mark_height_mm: args.teach_mark_height_mm,
         is_used: true,
     })
 }
 
-/// Teaches a model and writes it; `camera` is the node's camera file.
+/// The options of a job, on the node's device.
+fn options(job: &TeachJob, device: &Device) -> Result<TeachOptions> {
+    let mut options = TeachOptions::new(job.seed);
+    options.kind = job.model.parse().context("model")?;
+    options.time_budget = job.time_budget;
+    options.device = device.clone();
+    Ok(options)
+}
+
+/// Teaches a model and writes it; `device` and `camera` are the node's device and its camera file.
 ///
 /// # Errors
 /// The errors of `sdg teach`; or a height of marks is given without a camera.
-pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
+pub(super) fn teach(job: &TeachJob, device: &Device, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
     let demonstration = match &job.marks {
         Some(marks) => (job.photo.clone().into(), marks.clone()),
         None => photo_and_marks(&job.photo)?,
@@ -47,9 +56,7 @@ pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt
         }
         None => None,
     };
-    let mut options = TeachOptions::new(job.seed);
-    options.kind = job.model.parse().context("model")?;
-    options.time_budget = job.time_budget;
+    let mut options = options(job, device)?;
     let files = TeachingFiles { demonstrations: &[demonstration], negatives: &[], camera };
     let demonstrations = files.read(&mut options)?;
     // The node may have read the file as its model.
@@ -61,4 +68,22 @@ pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt
         eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
     Ok(())
+}
+
+#[cfg(all(test, feature = "ndarray"))]
+mod tests {
+    use super::*;
+    use sdg_grasp::ComputeBackend;
+
+    #[test]
+    fn a_service_teaches_on_the_device_of_the_node() {
+        let args = TeachTriggerArgs {
+            teach_demo: Some("part.png".to_owned()),
+            teach_out: Some("part.sdg".into()),
+            teach_model: "S".to_owned(),
+            teach_mark_height_mm: None,
+        };
+        let device = ComputeBackend::NdArray.open().unwrap();
+        assert_eq!(options(&trigger_job(&args).unwrap(), &device).unwrap().device, device);
+    }
 }

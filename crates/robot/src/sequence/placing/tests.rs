@@ -293,7 +293,8 @@ fn a_hand_that_holds_a_part_at_the_beginning_keeps_it() {
     cell.arm = cell.arm.with_hand(HandState { opening_m: 0.02, is_grasping: true, force_n: None });
     let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
-    assert!(why.contains("still holds an object"), "{why}");
+    // Only some arms are reached by commands of sdg.
+    assert_eq!(why, "the hand still holds an object: open it first");
     assert!(cell.arm.actions().is_empty());
 }
 
