@@ -172,12 +172,13 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         camera: args.camera.file.as_deref().map(|path| (path, args.camera.heights_m())),
     };
     let demonstrations = files.read(&mut options).map_err(of_region)?;
+    // The weights are an input that the model must not replace.
+    let report = read_base_weights(args, &mut options)?;
     sdg_files::check_writable(&args.out)?;
     sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
         sdg_files::prepare_folder(folder)?;
     }
-    let report = read_base_weights(args, &mut options)?;
 
     let taught = teach_to_file(&demonstrations, &options, (&args.out, None), &Interrupt::watch());
     let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
