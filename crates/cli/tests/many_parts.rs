@@ -67,6 +67,28 @@ fn parts_that_look_alike_are_told() {
 }
 
 #[test]
+fn models_remain_if_the_base_weights_are_missing_or_the_marks_are_damaged() {
+    let folder = Folder::new();
+    let (demos, out) = (demonstrations(&folder), folder.path("out"));
+    let arguments = ["--demos", &demos, "--out", &out];
+    stdout(&[&["teach", "--model", "S", "--part", "lever"][..], &arguments].concat());
+    let model = Path::new(&out).join("models/lever.sdg");
+    let before = fs::read(&model).unwrap();
+    let output = sdg(&[&["teach", "--preset", "r50-torchvision"][..], &arguments].concat());
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    assert_eq!(fs::read(&model).unwrap(), before);
+
+    for marks in ["lever.json", "rod_end.json", "twin/first.json"] {
+        fs::write(Path::new(&demos).join(marks), "{}").unwrap();
+    }
+    let output = sdg(&[&["teach", "--model", "S"][..], &arguments].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && error.contains("expected a part that can be taught"), "{error}");
+    assert!(!model.exists() && Path::new(&out).join("index.html").exists());
+    assert_eq!(fs::read(model.with_extension("sdg.before")).unwrap(), before);
+}
+
+#[test]
 fn wrong_folders_are_told() {
     let folder = Folder::new();
     let refused = |arguments: &[&str], code: i32, part: &str| {

@@ -182,10 +182,6 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
 
     let taught = teach_to_file(&demonstrations, &options, (&args.out, None), &Interrupt::watch());
     let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
-        Some(GraspError::NeedsBaseWeights { preset }) if *preset == Preset::Edge.name() => {
-            Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
-        }
-        Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
         Some(GraspError::Region(_)) => of_region(error),
         Some(GraspError::DemonstrationAsNegative { number }) => {
             let picture = args.negatives[number - 1].display();
@@ -322,9 +318,27 @@ pub(super) fn command(args: &TeachArgs) -> String {
     command
 }
 
-/// Adds the initial weights to the options. Weights that do not fit are rejected before the teaching, which takes
-/// minutes. Returns the report about the weights, for the JSON at the end.
+/// Adds the initial weights to the options. Missing weights, and weights that do not fit, are rejected before the
+/// teaching, which takes minutes. Returns the report about given weights, for the JSON at the end.
 pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
+    let report = read_given_weights(args, options)?;
+    *options = options.with_start_read().map_err(of_base_weights)?;
+    Ok(report)
+}
+
+/// Adds `--base-weights` to an error about missing weights.
+fn of_base_weights(error: GraspError) -> anyhow::Error {
+    match &error {
+        GraspError::NeedsBaseWeights { preset } if *preset == Preset::Edge.name() => {
+            Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
+        }
+        GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
+        _ => error.into(),
+    }
+}
+
+/// Reads the file of `--base-weights`.
+fn read_given_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
     if path.as_os_str() == NO_BASE_WEIGHTS {
         options.start = Start::Nothing;

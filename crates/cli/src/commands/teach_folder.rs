@@ -64,6 +64,9 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
         }
         println!("report: {}", report.display());
     }
+    if findings.taught.is_empty() {
+        bail!("{}: expected a part that can be taught, found none; the page has the reasons", folder.display());
+    }
     Ok(Outcome::Done)
 }
 

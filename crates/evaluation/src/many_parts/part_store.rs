@@ -112,18 +112,18 @@ impl PartStore {
         Ok((record.key == *key).then_some(record.outcome))
     }
 
-    /// Stores the outcome of a part. Without a model, an earlier model of the part is removed. The record is written
-    /// last, because it states that the model is complete.
+    /// Stores the outcome of a part. Without a model, an earlier model of the part is renamed to `NAME.sdg.before`. The
+    /// record is written last, because it states that the model is complete.
     ///
     /// # Errors
-    /// Files cannot be written or removed.
+    /// Files cannot be written or renamed.
     pub fn write(&self, part: &str, model: Option<&[u8]>, record: &PartRecord) -> Result<()> {
         let path = self.model_file(part);
         match model {
             Some(bytes) => write_atomically(&path, bytes)?,
-            None => match fs::remove_file(&path) {
+            None => match fs::rename(&path, path.with_extension("sdg.before")) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(error).with_context(|| format!("{}: cannot remove", path.display()));
+                    return Err(error).with_context(|| format!("{}: cannot rename", path.display()));
                 }
                 _ => {}
             },
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_teaching_leaves_no_earlier_model() {
+    fn a_failed_teaching_renames_the_earlier_model() {
         let folder = tempfile::tempdir().unwrap();
         let store = PartStore::open(folder.path()).unwrap();
         let outcome = PartOutcome::Failed { why: "nothing learnt".to_owned() };
@@ -148,6 +148,7 @@ mod tests {
             store.write("lever", model, &record).unwrap();
             assert_eq!(store.model_file("lever").exists(), model.is_some());
         }
+        assert_eq!(fs::read(store.model_file("lever").with_extension("sdg.before")).unwrap(), b"model");
         assert_eq!(store.read("lever", &Value::Null).unwrap(), Some(outcome));
     }
 }
