@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{Demonstration, IMAGE_EXTENSIONS};
 use sdg_geometry::RotationalSymmetry;
-use sdg_inputs::annotation_files::beside_photo;
+use sdg_inputs::annotation_files::{beside_photo, file_beside};
 use sdg_inputs::demonstrations;
 use sdg_weights_conversion::sha256_of;
 
@@ -130,13 +130,16 @@ impl PartDemonstrations {
         sdg_inputs::read_image(&self.files[0].0)
     }
 
-    /// Hashes of the contents of the part's files.
+    /// Hashes of the contents of the part's files, including the files that complete the marks, such as data.yaml.
     ///
     /// # Errors
     /// Files cannot be read.
     pub fn sha256(&self) -> Result<Vec<String>> {
-        let paths = self.files.iter().flat_map(|(photo, marks)| [photo, marks]);
-        paths.map(|path| sha256_of(path).with_context(|| path.display().to_string())).collect()
+        let files = |(photo, marks): &(PathBuf, PathBuf)| {
+            [Some(photo.clone()), Some(marks.clone()), file_beside(marks)].into_iter().flatten()
+        };
+        let paths = self.files.iter().flat_map(files);
+        paths.map(|path| sha256_of(&path).with_context(|| path.display().to_string())).collect()
     }
 }
 
@@ -159,5 +162,20 @@ mod tests {
         let found: Vec<_> = read.parts.iter().map(|part| (part.name.as_str(), part.symmetry)).collect();
         let [two, four] = [2, 4].map(|times| Some(RotationalSymmetry::Fold(times)));
         assert_eq!(found, [("key", four), ("rod end", two)]);
+    }
+
+    #[test]
+    fn a_changed_data_yaml_changes_the_hashes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [photo, marks, names] = ["key.png", "key.txt", "data.yaml"].map(|name| folder.path().join(name));
+        fs::write(&photo, "").unwrap();
+        fs::write(&marks, "0 0.5 0.5 0.25 0.5\n").unwrap();
+        let part = PartDemonstrations { name: "key".to_owned(), files: vec![(photo, marks)], symmetry: None };
+        let [first, second] = ["names: [key]\n", "names: [lock]\n"].map(|text| {
+            fs::write(&names, text).unwrap();
+            part.sha256().unwrap()
+        });
+        assert_eq!((first.len(), &first[..2]), (3, &second[..2]));
+        assert_ne!(first, second);
     }
 }
