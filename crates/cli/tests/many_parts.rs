@@ -52,10 +52,13 @@ fn parts_that_look_alike_are_told() {
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }
-    // Existing models are reused with their times; with another seed they are taught again.
+    // Existing models are reused with their times; with another seed, or if missing, they are taught again.
     assert_eq!(record("twin"), twin);
+    let rod_end = Path::new(&out).join("models/rod_end.sdg");
+    fs::remove_file(&rod_end).unwrap();
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");
+    assert!(rod_end.exists());
     assert!(teach(&["--part", "twin", "--seed", "2"]).status.success());
     assert_ne!(record("twin"), twin);
     // Random initialisation is another input than the included weights.

@@ -98,7 +98,8 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key.
+    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key, or if
+    /// the model file is missing.
     ///
     /// # Errors
     /// The record cannot be read or is damaged.
@@ -109,7 +110,8 @@ impl PartStore {
         }
         let record: PartRecord = serde_json::from_slice(&sdg_files::read(&path, MAX_RECORD_BYTES)?)
             .with_context(|| format!("{}: expected the record of a part", path.display()))?;
-        Ok((record.key == *key).then_some(record.outcome))
+        let is_missing = matches!(record.outcome, PartOutcome::Taught { .. }) && !self.model_file(part).exists();
+        Ok((record.key == *key && !is_missing).then_some(record.outcome))
     }
 
     /// Stores the outcome of a part. Without a model, an earlier model of the part is renamed to `NAME.sdg.before`. The
