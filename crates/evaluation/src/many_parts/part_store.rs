@@ -44,6 +44,9 @@ pub enum PartOutcome {
         without_part: usize,
         /// Median errors of the found parts: distance in pixels of the photo, and angle in degrees.
         median: Option<[f64; 2]>,
+        /// Numbers of the photos, from 1, whose grasp points in another direction than that of the first photo.
+        #[serde(default)]
+        turned_photos: Vec<usize>,
     },
     Failed {
         /// The reason of the failure, on one line.
@@ -63,6 +66,7 @@ impl PartOutcome {
             false_alarms: false_alarms.count,
             without_part: false_alarms.of,
             median: figures.median_errors(),
+            turned_photos: figures.turned().iter().map(|turned| turned.photo).collect(),
         }
     }
 
