@@ -11,7 +11,7 @@ use clap::Args as ClapArgs;
 use sdg_demonstration::Demonstration;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
-use sdg_evaluation::{TaughtFile, taught_words};
+use sdg_evaluation::{TaughtFile, quoted, taught_words};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights, first_names};
@@ -284,7 +284,7 @@ fn of_region(error: anyhow::Error) -> anyhow::Error {
 /// The command that makes the same model again.
 pub(super) fn command(args: &TeachArgs) -> String {
     let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
-    let mut option = |name: &str, value: String| command += &format!(" --{name} {value}");
+    let mut option = |name: &str, value: String| command += &format!(" --{name} {}", quoted(&value));
     if let Some(steps) = args.steps {
         option("steps", steps.to_string());
     }
@@ -315,7 +315,7 @@ pub(super) fn command(args: &TeachArgs) -> String {
     args.demonstrations.iter().for_each(|demonstration| option("demo", demonstration.clone()));
     args.negatives.iter().for_each(|negative| option("negative", negative.display().to_string()));
     option("out", args.out.display().to_string());
-    command
+    command + &args.compute.in_command()
 }
 
 /// Adds the initial weights to the options. Missing weights, and weights that do not fit, are rejected before the
@@ -372,4 +372,21 @@ fn read_given_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Op
 /// Parses an argument with a fixed set of values; another value is wrong usage.
 fn parse<T: FromStr<Err: Display>>(argument: &str, name: &str) -> Result<T> {
     Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Args, Command};
+    use clap::Parser;
+
+    #[test]
+    fn the_command_of_the_page_repeats_the_teaching() {
+        let line = ["sdg", "teach", "--demo", "my part.png", "--out", "part.sdg", "--device", "wgpu"];
+        let Command::Teach(args) = Args::try_parse_from(line).unwrap().command else { panic!("another command") };
+        assert_eq!(
+            command(&args),
+            "sdg teach --model C --preset edge --seed 1 --demo 'my part.png' --out part.sdg --device wgpu"
+        );
+    }
 }
