@@ -1,9 +1,9 @@
 //! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture. A file with the labels of one picture belongs to the picture with the file's name, even if
-//! another picture is named in the file, because people rename files. Every other label file belongs to the pictures
-//! that it names.
+//! COCO beside the picture; if a.json is another tool's file, it writes a.coco.json, which then replaces a.json. A file
+//! with the labels of one picture belongs to the picture with the file's name, even if another picture is named in the
+//! file, because people rename files. Every other label file belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -127,14 +127,21 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         let label_file_idx = assigned.label_files.len();
         assigned.label_files.push((path.clone(), file));
         for picture in labelled {
-            if let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) {
+            let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) else { continue };
+            let first_path = &assigned.label_files[first].0;
+            // Paths are sorted, so a.coco.json is before a.json.
+            let is_ours = *first_path == picture.with_extension("coco.json");
+            if !is_ours || *path != picture.with_extension("json") {
                 bail!(
                     "{}: expected one label file, found two: {} and {}",
                     picture.display(),
-                    file_name(&assigned.label_files[first].0),
+                    file_name(first_path),
                     file_name(path)
                 );
             }
+            let why = format!("{} is used for {}", file_name(first_path), file_name(&picture));
+            left_out.push(LeftOut { file: file_name(path), why });
+            assigned.pictures.insert(picture, first);
         }
     }
     if assigned.pictures.is_empty() {
