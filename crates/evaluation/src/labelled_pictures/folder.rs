@@ -13,9 +13,8 @@ use nalgebra::Point2;
 use sdg_cell::Perception;
 use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
 use sdg_grasp::GraspModel;
-use sdg_inputs::UNREADABLE_EXTENSIONS;
 use sdg_inputs::marks_check::MarkedPhoto;
-use sdg_inputs::one_line;
+use sdg_inputs::why_unreadable;
 
 use super::picture::{Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
@@ -105,10 +104,8 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
     }
     // Photos in unsupported formats, such as those of phones, are listed, so that the user learns that they were not
     // tested.
-    for path in paths.iter().filter(|path| sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
-        let why = sdg_inputs::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
-        left_out.push(LeftOut { file: file_name(path), why });
-    }
+    let unreadable = |path: &PathBuf| Some(LeftOut { file: file_name(path), why: why_unreadable(path)? });
+    left_out.extend(paths.iter().filter_map(unreadable));
     let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
     for path in paths.iter().filter(|path| sdg_files::has_extension(path, &["json"])) {
         let same_name: Vec<&PathBuf> =

@@ -19,7 +19,7 @@ pub struct Findings {
     pub look_alikes: Vec<LookAlikePair>,
     /// Parts that need another photo, and the reasons.
     pub need_photo: Vec<(String, String)>,
-    /// Photos without marks, and the reasons why they are left out.
+    /// Photos without marks or of a format that is not read, and the reasons why they are left out.
     pub left_out: Vec<(String, String)>,
 }
 
