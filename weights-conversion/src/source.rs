@@ -32,7 +32,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Opens a file.
+    /// Opens a file, which outputs of this process then do not replace.
     ///
     /// # Errors
     /// A file that cannot be opened, or that has no length (a folder, a pipe).
@@ -43,6 +43,7 @@ impl Source {
             let found = if metadata.is_dir() { "a folder" } else { "a pipe or a device" };
             return Err(WeightsError::NotACheckpoint { found: found.to_owned() });
         }
+        sdg_files::keep(path);
         Ok(Self { reader: Box::new(file), len: metadata.len() })
     }
 

@@ -16,7 +16,6 @@ use std::thread;
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
-use sdg_files::AtomicFile;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -67,7 +66,8 @@ impl Conversion {
     ///
     /// # Errors
     /// The errors of [`Self::complete`]; values that are not finite, or too large for the precision; a truncated
-    /// checkpoint; a folder that cannot be written. An existing file at the second path is then unchanged.
+    /// checkpoint; a folder that cannot be written; an input or a file of another kind at the second path. An existing
+    /// file at the second path is then unchanged.
     pub fn write(
         &self,
         checkpoint: &Checkpoint,
@@ -78,12 +78,12 @@ impl Conversion {
     ) -> Result<Written> {
         self.complete()?;
         let [from, out] = paths;
+        // The header comes first in the file and contains the hash, which is known last: its space is reserved.
+        let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
+        let header = self.header(&metadata(&"0".repeat(64)), precision);
+        let mut file = sdg_files::create(out, &header)?;
         thread::scope(|scope| {
             let hashing = scope.spawn(|| sha256_of(from));
-            // The header comes first in the file and contains the hash, which is known last: its space is reserved.
-            let mut file = AtomicFile::create(out)?;
-            let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
-            let header = self.header(&metadata(&"0".repeat(64)), precision);
             let body = BufWriter::with_capacity(1 << 20, file.as_file());
             self.write_body(source, body, &header, precision)?;
             let sha256 = match hashing.join() {

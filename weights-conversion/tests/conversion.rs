@@ -77,7 +77,6 @@ fn every_value_of_detectron2_s_files_arrives_under_its_name() {
     let digests: BTreeMap<String, BTreeMap<String, String>> =
         serde_json::from_slice(&fs::read(fixture("detectron2_digests.json")).unwrap()).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("converted.safetensors");
     for (kind, target) in [("keypoint", narrow_keypoint()), ("mask", narrow_mask())] {
         let file = fixture(&format!("detectron2_{kind}.pkl"));
         let (_, _, conversion) = planned(&file, &target, &[]);
@@ -85,6 +84,7 @@ fn every_value_of_detectron2_s_files_arrives_under_its_name() {
         assert_eq!(conversion.report().unused, [""; 0]);
         assert_eq!(conversion.report().not_needed, ["proposal_generator.anchor_generator.cell_anchors.0"]);
 
+        let out = folder.path().join(format!("{kind}.safetensors"));
         let converted = convert(&file, &target, &out, Precision::F32);
         let mut source = Source::open(&out).unwrap();
         for applied in &conversion.report().applied {
@@ -181,7 +181,7 @@ fn write_tensors(path: &Path, tensors: &BTreeMap<String, (Vec<usize>, Vec<f32>)>
 #[test]
 fn torchvision_s_background_moves_behind_the_classes() {
     let folder = tempfile::tempdir().unwrap();
-    let [from, out] = ["torchvision.safetensors", "out.safetensors"].map(|name| folder.path().join(name));
+    let [from, last, first] = ["torchvision", "last", "first"].map(|name| folder.path().join(name));
     // Two classes and the background: each row of the predictors contains the index of its class.
     let classes = |rows_a_class: usize, width: usize| -> (Vec<usize>, Vec<f32>) {
         let rows = 3 * rows_a_class;
@@ -200,27 +200,27 @@ fn torchvision_s_background_moves_behind_the_classes() {
     write_tensors(&from, &theirs);
     let others = ["backbone", "proposal_generator", "roi_heads.box_head", "roi_heads.mask_head.mask_fcn"];
     let parts = [&others[..], &["roi_heads.mask_head.deconv", "roi_heads.mask_head.predictor.weight"]].concat();
-    let read = |target: &Architecture| {
+    let read = |target: &Architecture, out: &Path| {
         let (mut source, checkpoint, conversion) = planned(&from, target, &parts);
-        conversion.write(&checkpoint, &mut source, [&from, &out], Precision::F32, &BTreeMap::new()).unwrap();
-        let mut source = Source::open(&out).unwrap();
+        conversion.write(&checkpoint, &mut source, [&from, out], Precision::F32, &BTreeMap::new()).unwrap();
+        let mut source = Source::open(out).unwrap();
         let written = Checkpoint::read(&mut source).unwrap();
         let names = ["box_predictor.cls_score.bias", "box_predictor.bbox_pred.bias", "mask_head.predictor.bias"];
         let weight = written.tensors["roi_heads.box_predictor.cls_score.weight"].values(&mut source).unwrap();
         let biases = names.map(|n| written.tensors[&format!("roi_heads.{n}")].values(&mut source).unwrap());
         (weight, biases)
     };
-    let (weight, [scores, deltas, masks]) = read(&narrow_mask());
+    let (weight, [scores, deltas, masks]) = read(&narrow_mask(), &last);
     assert_eq!(scores, [1.0, 2.0, 0.0]);
     assert_eq!(weight, [[1.0; 8], [2.0; 8], [0.0; 8]].concat());
     assert_eq!(deltas, [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
     assert_eq!(masks, [1.0, 2.0]);
 
-    let mut first = narrow_mask();
-    let heads = first.heads.as_mut().unwrap();
+    let mut background_first = narrow_mask();
+    let heads = background_first.heads.as_mut().unwrap();
     heads.background = Background::First;
     heads.mask.as_mut().unwrap().num_masks = 3;
-    let (_, [scores, deltas, masks]) = read(&first);
+    let (_, [scores, deltas, masks]) = read(&background_first, &first);
     assert_eq!((scores, deltas.len(), masks), (vec![0.0, 1.0, 2.0], 12, vec![0.0, 1.0, 2.0]));
 }
 

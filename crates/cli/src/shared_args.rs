@@ -14,6 +14,13 @@ pub struct ComputeArgs {
     pub device: ComputeBackend,
 }
 
+impl ComputeArgs {
+    /// The option as the end of a command; empty for the default device.
+    pub fn in_command(&self) -> String {
+        if self.device == ComputeBackend::default() { String::new() } else { format!(" --device {}", self.device) }
+    }
+}
+
 /// The camera that took the photos to teach from.
 #[derive(Debug, ClapArgs)]
 pub struct TaughtCameraArgs {

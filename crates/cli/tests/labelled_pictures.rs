@@ -314,6 +314,20 @@ fn labels_of_another_grasp_and_a_copy_of_the_taught_photo_are_told() {
 }
 
 #[test]
+fn the_file_of_sdg_annotate_is_preferred_to_that_of_another_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = teach(folder.path());
+    let pictures = folder.path().join("pictures");
+    fs::create_dir(&pictures).unwrap();
+    write_turned(&pictures, "a.png", 1, 0.0);
+    let ours = json!({"images": [{"id": 1, "file_name": "a.png"}], "annotations": []});
+    fs::write(pictures.join("a.coco.json"), ours.to_string()).unwrap();
+    let told = evaluate(&pictures, &model, &folder.path().join("report"), &[]);
+    assert_eq!(told["left_out"], json!([{"file": "a.json", "why": "a.coco.json is used for a.png"}]));
+    assert_eq!(told["parts"], 0);
+}
+
+#[test]
 fn wrong_folders_are_refused_with_what_was_expected() {
     let teaching = tempfile::tempdir().unwrap();
     let model = teach(teaching.path());

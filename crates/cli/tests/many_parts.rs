@@ -52,10 +52,13 @@ fn parts_that_look_alike_are_told() {
     for part in ["lever", "rod_end", "twin"] {
         assert!(page.contains(&format!("{part}: ")), "{part}");
     }
-    // Existing models are reused with their times; with another seed they are taught again.
+    // Existing models are reused with their times; with another seed, or if missing, they are taught again.
     assert_eq!(record("twin"), twin);
+    let rod_end = Path::new(&out).join("models/rod_end.sdg");
+    fs::remove_file(&rod_end).unwrap();
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");
+    assert!(rod_end.exists());
     assert!(teach(&["--part", "twin", "--seed", "2"]).status.success());
     assert_ne!(record("twin"), twin);
     // Random initialisation is another input than the included weights.
@@ -64,6 +67,28 @@ fn parts_that_look_alike_are_told() {
     let without_weights = record("lever");
     assert!(teach(&["--part", "lever"]).status.success());
     assert_ne!(record("lever"), without_weights);
+}
+
+#[test]
+fn models_remain_if_the_base_weights_are_missing_or_the_marks_are_damaged() {
+    let folder = Folder::new();
+    let (demos, out) = (demonstrations(&folder), folder.path("out"));
+    let arguments = ["--demos", &demos, "--out", &out];
+    stdout(&[&["teach", "--model", "S", "--part", "lever"][..], &arguments].concat());
+    let model = Path::new(&out).join("models/lever.sdg");
+    let before = fs::read(&model).unwrap();
+    let output = sdg(&[&["teach", "--preset", "r50-torchvision"][..], &arguments].concat());
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    assert_eq!(fs::read(&model).unwrap(), before);
+
+    for marks in ["lever.json", "rod_end.json", "twin/first.json"] {
+        fs::write(Path::new(&demos).join(marks), "{}").unwrap();
+    }
+    let output = sdg(&[&["teach", "--model", "S"][..], &arguments].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && error.contains("expected a part that can be taught"), "{error}");
+    assert!(!model.exists() && Path::new(&out).join("index.html").exists());
+    assert_eq!(fs::read(model.with_extension("sdg.before")).unwrap(), before);
 }
 
 #[test]

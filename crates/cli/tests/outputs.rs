@@ -1,8 +1,10 @@
 //! No output replaces an input of the command, and a model only replaces a model.
 
 use std::fs;
+use std::path::Path;
 
 use crate::support::{Folder, sdg, shipped, stdout};
+use crate::weights::{config, fixture};
 
 /// A folder with the key's photo and marks.
 fn photographed() -> (Folder, String, String) {
@@ -76,4 +78,20 @@ fn frames_and_samples_replace_no_picture() {
     let demo = format!("{photo}:{list}");
     let augment = ["augment", "--demo", &demo, "--count", "2", "--out", &pictures];
     refused(&augment, "found an input of this command", &[&first, &list]);
+}
+
+#[test]
+fn weights_replace_neither_their_source_nor_other_files() {
+    let (folder, photo, _) = photographed();
+    let config = config(Path::new(&folder.path("")), 1);
+    let checkpoint = folder.path("model.pkl");
+    fs::copy(fixture("detectron2_keypoint.pkl"), &checkpoint).unwrap();
+    for (out, part) in [(&checkpoint, "found an input of this command"), (&photo, "found a picture (Png)")] {
+        let convert = ["weights", "convert", &checkpoint, out, "--config", config.to_str().unwrap()];
+        refused(&convert, part, &[out]);
+    }
+    let weights = folder.path("edge.safetensors");
+    fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("../grasp/weights/edge.safetensors"), &weights).unwrap();
+    let teach = ["teach", "--demo", &photo, "--base-weights", &weights, "--out", &weights];
+    refused(&teach, "found an input of this command", &[&weights]);
 }

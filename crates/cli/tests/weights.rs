@@ -12,13 +12,13 @@ fn sdg_weights(arguments: &[&str]) -> Output {
     sdg(&[&["weights"], arguments].concat())
 }
 
-fn fixture(name: &str) -> String {
+pub(crate) fn fixture(name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../weights-conversion/tests/fixtures");
     folder.join(name).to_str().unwrap().to_owned()
 }
 
 /// A short configuration: the widths of `detectron2_keypoint.pkl`.
-fn config(folder: &Path, classes: usize) -> PathBuf {
+pub(crate) fn config(folder: &Path, classes: usize) -> PathBuf {
     let path = folder.join("config.json");
     let config = json!({
         "kind": "keypoint", "classes": classes, "keypoints": 12, "min_size_test": 240, "max_size_test": 400,

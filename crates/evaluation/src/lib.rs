@@ -43,6 +43,7 @@ pub mod rehearsal;
 pub mod run_page;
 #[cfg(feature = "simulation")]
 mod run_words;
+mod shell_word;
 #[cfg(feature = "simulation")]
 pub mod shipped;
 #[cfg(feature = "simulation")]
@@ -66,6 +67,7 @@ pub use own_part::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
 pub use progress::Progress;
 #[cfg(feature = "simulation")]
 pub use run_words::{attempt_in_words, run_json};
+pub use shell_word::quoted;
 #[cfg(feature = "simulation")]
 pub use simulated::*;
 #[cfg(feature = "simulation")]

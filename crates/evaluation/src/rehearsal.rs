@@ -266,7 +266,8 @@ impl Rehearsal<'_> {
         Ok(Some((goal, PlacingConfig { symmetry: self.model.facts().symmetry, ..PlacingConfig::default() })))
     }
 
-    /// The model with the lengths that the robot uses in an attempt, including the error of the marks' height.
+    /// The model with the lengths that the robot uses in an attempt, including the error of the marks' height. It has
+    /// no region, because a region refers to the user's camera, not to the simulated one.
     ///
     /// # Errors
     /// Invalid lengths.
@@ -275,10 +276,11 @@ impl Rehearsal<'_> {
         let known = &self.model.facts().lengths;
         let mut lengths = known.clone().map_or_else(|| self.lengths_of_demonstration(), Ok)?;
         lengths.mark_height_m += sign * self.errors.mark_height_m;
+        let model = self.model.clone().with_region(None)?;
         if known.as_ref() == Some(&lengths) {
-            return Ok(self.model.clone());
+            return Ok(model);
         }
-        Ok(self.model.clone().with_lengths(lengths, f64::INFINITY)?)
+        Ok(model.with_lengths(lengths, f64::INFINITY)?)
     }
 
     /// The lengths of a model that was taught from a shipped photo without a plan view. They follow from the camera of
@@ -352,6 +354,30 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shipped;
+    use sdg_grasp::{ModelKind, SearchRegion, TeachOptions, teach};
+
+    #[test]
+    fn the_region_of_a_model_is_ignored() {
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        options.region = Some(SearchRegion { x: 200, y: 100, width: 300, height: 300, picture: None });
+        let demonstration = shipped::demonstration("pendulum").unwrap();
+        let model = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        assert!(model.region().is_some());
+        let object = ObjectSpec::by_name("pendulum").unwrap();
+        let rehearsal = Rehearsal {
+            model: &model,
+            object: &object,
+            attempts: 1,
+            seed: 1,
+            verification: Verification::ByShape,
+            errors: RehearsalErrors::default(),
+            camera: None,
+            place: None,
+        };
+        assert_eq!(rehearsal.told_model(1).unwrap().region(), None);
+    }
 
     #[test]
     fn attempts_of_neighbouring_seeds_differ() {

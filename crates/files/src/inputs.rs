@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::atomic::write_atomically;
+use crate::atomic::{AtomicFile, write_atomically};
 use crate::error::{FileError, Result};
 use crate::folder::{check_folder_writable, folder_of};
 use crate::kind::check_replaces_its_kind;
@@ -82,6 +82,17 @@ pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
     check_is_no_input(path, own)?;
     check_replaces_its_kind(path, bytes)?;
     write_atomically(path, bytes)
+}
+
+/// Starts a file whose contents begin with `start`; like [`write`], it replaces no input and no file of another kind.
+///
+/// # Errors
+/// The path leads to such a file, or the errors of [`AtomicFile::create`].
+pub fn create(path: &Path, start: &[u8]) -> Result<AtomicFile> {
+    check_is_no_input(path, None)?;
+    let file = AtomicFile::create(path)?;
+    check_replaces_its_kind(path, start)?;
+    Ok(file)
 }
 
 /// Checks, before minutes of work, that a file can be written at `path` later, and that it is not an input.

@@ -117,6 +117,13 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     }
 }
 
+/// The second file that [`AnnotationFile::read`] reads for this annotation file; `None` if there is none, or if the
+/// annotation file cannot be read.
+pub fn file_beside(annotation: &Path) -> Option<PathBuf> {
+    let bytes = sdg_files::read(annotation, MAX_ANNOTATION_BYTES).ok()?;
+    beside(annotation, AnnotationFormat::of(&bytes).ok()?)
+}
+
 /// The file that belongs to `path`, if it exists.
 fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     match format {

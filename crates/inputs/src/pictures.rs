@@ -7,6 +7,8 @@ use image::RgbImage;
 use sdg_demonstration::{ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
 use sdg_files::{read, read_bounded};
 
+use crate::error_line::one_line;
+
 /// Maximum size of a picture's file.
 const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
@@ -41,6 +43,12 @@ pub fn check_is_not_turned(photo: &Path) -> Result<()> {
 
 /// Extensions of picture formats that cannot be read; such a file gives an error and is not skipped.
 pub const UNREADABLE_EXTENSIONS: [&str; 4] = ["heic", "heif", "avif", "gif"];
+
+/// The error of a file with one of the [`UNREADABLE_EXTENSIONS`]; `None` for other files.
+pub fn why_unreadable(path: &Path) -> Option<String> {
+    sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)
+        .then(|| read_image(path).err().map(|error| one_line(&error)).unwrap_or_default())
+}
 
 /// Reads a picture from standard input until its end.
 pub fn read_standard_input_image(frame: PixelFrame) -> Result<RgbImage> {

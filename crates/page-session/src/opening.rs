@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow};
 use sdg_annotate::{LiveOptions, Session, SessionOptions};
 use sdg_files::{FileError, WriterLock};
-use sdg_inputs::{UNREADABLE_EXTENSIONS, one_line};
+use sdg_inputs::why_unreadable;
 
 use crate::teacher::PageTeacher;
 
@@ -47,8 +47,7 @@ pub fn open_session(
     for folder in options.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in sdg_files::entries(folder)? {
             // Other kinds of files are expected beside the pictures and are not reported.
-            if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
-                let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
+            if let Some(why) = why_unreadable(&path) {
                 report(&format!("left out: {why}"));
             }
         }

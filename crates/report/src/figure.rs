@@ -10,6 +10,9 @@ use crate::animation::Animation;
 use crate::error::ReportError;
 use crate::html::escape;
 
+/// Maximum width of a photo on the page, in pixels.
+pub(crate) const MAX_PHOTO_WIDTH: u32 = 1280;
+
 /// A picture with its caption.
 #[derive(Debug, Clone)]
 pub struct Figure {
@@ -34,9 +37,11 @@ pub(crate) struct PhotoQuality {
 }
 
 impl Figure {
-    /// A still picture.
+    /// A still picture. A wide one is reduced at once, because the figures of a page are in memory together.
     #[must_use]
     pub fn photo(image: RgbImage) -> Self {
+        let is_wide = image.width() > MAX_PHOTO_WIDTH && image.height() > 0;
+        let image = if is_wide { reduced(&image, MAX_PHOTO_WIDTH) } else { image };
         Self { picture: Picture::Photo(image), alt: None, caption: None }
     }
 
@@ -106,15 +111,20 @@ fn encode_jpeg(photo: &RgbImage, quality: PhotoQuality) -> Result<(Vec<u8>, u32,
     let mut bytes = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut bytes, quality.jpeg);
     let (result, size) = if width > quality.max_width {
-        let scale = f64::from(quality.max_width) / f64::from(width);
-        let small_height = ((f64::from(height) * scale).round() as u32).max(1);
-        let small = imageops::resize(photo, quality.max_width, small_height, FilterType::CatmullRom);
+        let small = reduced(photo, quality.max_width);
         (encoder.encode_image(&small), small.dimensions())
     } else {
         (encoder.encode_image(photo), (width, height))
     };
     result.map_err(|source| ReportError::Jpeg { width, height, source })?;
     Ok((bytes, size.0, size.1))
+}
+
+/// The photo, reduced to this width.
+fn reduced(photo: &RgbImage, width: u32) -> RgbImage {
+    let scale = f64::from(width) / f64::from(photo.width());
+    let height = ((f64::from(photo.height()) * scale).round() as u32).max(1);
+    imageops::resize(photo, width, height, FilterType::CatmullRom)
 }
 
 #[cfg(test)]
@@ -141,6 +151,12 @@ mod tests {
         let decoded = image::load_from_memory(&embedded(&html, "jpeg")).unwrap().to_rgb8();
         let worst = photo.as_raw().iter().zip(decoded.as_raw()).map(|(&a, &b)| a.abs_diff(b)).max();
         assert!(worst < Some(24), "{worst:?}");
+    }
+
+    #[test]
+    fn a_figure_holds_no_photo_wider_than_the_page() {
+        let figure = Figure::photo(RgbImage::new(4000, 3000));
+        assert!(matches!(&figure.picture, Picture::Photo(photo) if photo.dimensions() == (1280, 960)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::ReportError;
-use crate::figure::{Figure, PhotoQuality};
+use crate::figure::{Figure, MAX_PHOTO_WIDTH, PhotoQuality};
 use crate::html::{escape, slug};
 use crate::section::Section;
 use crate::table::Tone;
@@ -13,8 +13,8 @@ const PAGE_BYTES: usize = 4_000_000;
 
 /// Qualities that are tried in order until the page is small enough; the last one is used even if it is not.
 const QUALITIES: [PhotoQuality; 4] = [
-    PhotoQuality { jpeg: 86, max_width: 1280 },
-    PhotoQuality { jpeg: 76, max_width: 1280 },
+    PhotoQuality { jpeg: 86, max_width: MAX_PHOTO_WIDTH },
+    PhotoQuality { jpeg: 76, max_width: MAX_PHOTO_WIDTH },
     PhotoQuality { jpeg: 66, max_width: 960 },
     PhotoQuality { jpeg: 52, max_width: 640 },
 ];

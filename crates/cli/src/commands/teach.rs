@@ -11,7 +11,7 @@ use clap::Args as ClapArgs;
 use sdg_demonstration::Demonstration;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
-use sdg_evaluation::{TaughtFile, taught_words};
+use sdg_evaluation::{TaughtFile, quoted, taught_words};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights, first_names};
@@ -172,19 +172,16 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         camera: args.camera.file.as_deref().map(|path| (path, args.camera.heights_m())),
     };
     let demonstrations = files.read(&mut options).map_err(of_region)?;
+    // The weights are an input that the model must not replace.
+    let report = read_base_weights(args, &mut options)?;
     sdg_files::check_writable(&args.out)?;
     sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
         sdg_files::prepare_folder(folder)?;
     }
-    let report = read_base_weights(args, &mut options)?;
 
     let taught = teach_to_file(&demonstrations, &options, (&args.out, None), &Interrupt::watch());
     let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
-        Some(GraspError::NeedsBaseWeights { preset }) if *preset == Preset::Edge.name() => {
-            Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
-        }
-        Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
         Some(GraspError::Region(_)) => of_region(error),
         Some(GraspError::DemonstrationAsNegative { number }) => {
             let picture = args.negatives[number - 1].display();
@@ -287,7 +284,7 @@ fn of_region(error: anyhow::Error) -> anyhow::Error {
 /// The command that makes the same model again.
 pub(super) fn command(args: &TeachArgs) -> String {
     let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
-    let mut option = |name: &str, value: String| command += &format!(" --{name} {value}");
+    let mut option = |name: &str, value: String| command += &format!(" --{name} {}", quoted(&value));
     if let Some(steps) = args.steps {
         option("steps", steps.to_string());
     }
@@ -318,12 +315,30 @@ pub(super) fn command(args: &TeachArgs) -> String {
     args.demonstrations.iter().for_each(|demonstration| option("demo", demonstration.clone()));
     args.negatives.iter().for_each(|negative| option("negative", negative.display().to_string()));
     option("out", args.out.display().to_string());
-    command
+    command + &args.compute.in_command()
 }
 
-/// Adds the initial weights to the options. Weights that do not fit are rejected before the teaching, which takes
-/// minutes. Returns the report about the weights, for the JSON at the end.
+/// Adds the initial weights to the options. Missing weights, and weights that do not fit, are rejected before the
+/// teaching, which takes minutes. Returns the report about given weights, for the JSON at the end.
 pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
+    let report = read_given_weights(args, options)?;
+    *options = options.with_start_read().map_err(of_base_weights)?;
+    Ok(report)
+}
+
+/// Adds `--base-weights` to an error about missing weights.
+fn of_base_weights(error: GraspError) -> anyhow::Error {
+    match &error {
+        GraspError::NeedsBaseWeights { preset } if *preset == Preset::Edge.name() => {
+            Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
+        }
+        GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
+        _ => error.into(),
+    }
+}
+
+/// Reads the file of `--base-weights`.
+fn read_given_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
     if path.as_os_str() == NO_BASE_WEIGHTS {
         options.start = Start::Nothing;
@@ -357,4 +372,21 @@ pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) ->
 /// Parses an argument with a fixed set of values; another value is wrong usage.
 fn parse<T: FromStr<Err: Display>>(argument: &str, name: &str) -> Result<T> {
     Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Args, Command};
+    use clap::Parser;
+
+    #[test]
+    fn the_command_of_the_page_repeats_the_teaching() {
+        let line = ["sdg", "teach", "--demo", "my part.png", "--out", "part.sdg", "--device", "wgpu"];
+        let Command::Teach(args) = Args::try_parse_from(line).unwrap().command else { panic!("another command") };
+        assert_eq!(
+            command(&args),
+            "sdg teach --model C --preset edge --seed 1 --demo 'my part.png' --out part.sdg --device wgpu"
+        );
+    }
 }

@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use sdg_evaluation::Progress;
 use sdg_evaluation::many_parts::{
     DemonstrationFolder, PartDemonstrations, PartOutcome, PartOutcomes, PartStore, PartTeaching, page,
 };
+use sdg_evaluation::{Progress, quoted};
 use sdg_weights_conversion::sha256_of;
 use serde_json::{Value, json};
 
@@ -64,6 +64,9 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
         }
         println!("report: {}", report.display());
     }
+    if findings.taught.is_empty() {
+        bail!("{}: expected a part that can be taught, found none; the page has the reasons", folder.display());
+    }
     Ok(Outcome::Done)
 }
 
@@ -101,5 +104,5 @@ fn told(args: &TeachArgs, outcomes: PartOutcomes) -> Result<Outcome> {
 fn command(args: &TeachArgs, folder: &Path) -> String {
     let rest = super::teach::command(args);
     let rest = rest.strip_prefix("sdg teach").unwrap_or(&rest);
-    format!("sdg teach --demos {}{rest}", folder.display())
+    format!("sdg teach --demos {}{rest}", quoted(&folder.display().to_string()))
 }

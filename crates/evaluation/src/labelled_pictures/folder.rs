@@ -1,9 +1,9 @@
 //! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture. A file with the labels of one picture belongs to the picture with the file's name, even if
-//! another picture is named in the file, because people rename files. Every other label file belongs to the pictures
-//! that it names.
+//! COCO beside the picture; if a.json is another tool's file, it writes a.coco.json, which then replaces a.json. A file
+//! with the labels of one picture belongs to the picture with the file's name, even if another picture is named in the
+//! file, because people rename files. Every other label file belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,9 +13,8 @@ use nalgebra::Point2;
 use sdg_cell::Perception;
 use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
 use sdg_grasp::GraspModel;
-use sdg_inputs::UNREADABLE_EXTENSIONS;
 use sdg_inputs::marks_check::MarkedPhoto;
-use sdg_inputs::one_line;
+use sdg_inputs::why_unreadable;
 
 use super::picture::{Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
@@ -105,10 +104,8 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
     }
     // Photos in unsupported formats, such as those of phones, are listed, so that the user learns that they were not
     // tested.
-    for path in paths.iter().filter(|path| sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
-        let why = sdg_inputs::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
-        left_out.push(LeftOut { file: file_name(path), why });
-    }
+    let unreadable = |path: &PathBuf| Some(LeftOut { file: file_name(path), why: why_unreadable(path)? });
+    left_out.extend(paths.iter().filter_map(unreadable));
     let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
     for path in paths.iter().filter(|path| sdg_files::has_extension(path, &["json"])) {
         let same_name: Vec<&PathBuf> =
@@ -127,14 +124,21 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         let label_file_idx = assigned.label_files.len();
         assigned.label_files.push((path.clone(), file));
         for picture in labelled {
-            if let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) {
+            let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) else { continue };
+            let first_path = &assigned.label_files[first].0;
+            // Paths are sorted, so a.coco.json is before a.json.
+            let is_ours = *first_path == picture.with_extension("coco.json");
+            if !is_ours || *path != picture.with_extension("json") {
                 bail!(
                     "{}: expected one label file, found two: {} and {}",
                     picture.display(),
-                    file_name(&assigned.label_files[first].0),
+                    file_name(first_path),
                     file_name(path)
                 );
             }
+            let why = format!("{} is used for {}", file_name(first_path), file_name(&picture));
+            left_out.push(LeftOut { file: file_name(path), why });
+            assigned.pictures.insert(picture, first);
         }
     }
     if assigned.pictures.is_empty() {

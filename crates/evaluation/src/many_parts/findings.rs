@@ -19,7 +19,7 @@ pub struct Findings {
     pub look_alikes: Vec<LookAlikePair>,
     /// Parts that need another photo, and the reasons.
     pub need_photo: Vec<(String, String)>,
-    /// Photos without marks, and the reasons why they are left out.
+    /// Photos without marks or of a format that is not read, and the reasons why they are left out.
     pub left_out: Vec<(String, String)>,
 }
 
@@ -33,6 +33,12 @@ impl Findings {
             let place = taught.iter().position(|known| known == name);
             let why = match outcome {
                 PartOutcome::Failed { why } => Some(format!("not taught: {why}")),
+                // First, because it can be the cause of the other reasons.
+                PartOutcome::Taught { turned_photos, .. } if !turned_photos.is_empty() => {
+                    let photos: Vec<String> = turned_photos.iter().map(usize::to_string).collect();
+                    let photos = photos.join(", ");
+                    Some(format!("its grasp has another direction in photo {photos} than in photo 1: mark them alike"))
+                }
                 PartOutcome::Taught { .. } if place.is_some_and(|place| !check.finds_own(place)) => {
                     Some("its model does not find it in its own photo".to_owned())
                 }
@@ -77,7 +83,7 @@ impl Findings {
 mod tests {
     use super::*;
 
-    fn taught(found: usize, false_alarms: usize) -> PartOutcome {
+    fn taught(found: usize, false_alarms: usize, turned_photos: &[usize]) -> PartOutcome {
         PartOutcome::Taught {
             seconds: 1.0,
             found,
@@ -86,18 +92,25 @@ mod tests {
             false_alarms,
             without_part: 6,
             median: Some([1.0, 0.5]),
+            turned_photos: turned_photos.to_vec(),
         }
     }
 
     #[test]
     fn every_reason_for_another_photo_is_told() {
         let failed = PartOutcome::Failed { why: "no outline".to_owned() };
-        let parts =
-            [("a", taught(18, 0)), ("b", failed), ("c", taught(10, 0)), ("d", taught(18, 4)), ("e", taught(18, 0))];
+        let parts = [
+            ("a", taught(18, 0, &[])),
+            ("b", failed),
+            ("c", taught(10, 0, &[])),
+            ("d", taught(18, 4, &[])),
+            ("e", taught(18, 0, &[])),
+            ("f", taught(18, 0, &[2, 3])),
+        ];
         let parts = parts.map(|(name, outcome)| (name.to_owned(), outcome)).to_vec();
         let own =
-            |scores: [f64; 4]| (0..4).map(|i| (0..4).map(|j| if i == j { scores[i] } else { 0.0 }).collect()).collect();
-        let findings = Findings::new(parts, CrossCheck { scores: own([0.9, 0.9, 0.9, 0.3]) }, Vec::new());
+            |scores: [f64; 5]| (0..5).map(|i| (0..5).map(|j| if i == j { scores[i] } else { 0.0 }).collect()).collect();
+        let findings = Findings::new(parts, CrossCheck { scores: own([0.9, 0.9, 0.9, 0.3, 0.9]) }, Vec::new());
         let told: Vec<String> = findings.need_photo.iter().map(|(name, why)| format!("{name}: {why}")).collect();
         assert_eq!(
             told,
@@ -105,9 +118,10 @@ mod tests {
                 "b: not taught: no outline",
                 "c: its model finds it in 10 of 18 held-out samples",
                 "d: its model finds it in 4 of 6 samples without it",
-                "e: its model does not find it in its own photo"
+                "e: its model does not find it in its own photo",
+                "f: its grasp has another direction in photo 2, 3 than in photo 1: mark them alike"
             ]
         );
-        assert_eq!(findings.taught, ["a", "c", "d", "e"]);
+        assert_eq!(findings.taught, ["a", "c", "d", "e", "f"]);
     }
 }

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{Demonstration, IMAGE_EXTENSIONS};
 use sdg_geometry::RotationalSymmetry;
-use sdg_inputs::annotation_files::beside_photo;
-use sdg_inputs::demonstrations;
+use sdg_inputs::annotation_files::{beside_photo, file_beside};
+use sdg_inputs::{UNREADABLE_EXTENSIONS, demonstrations, why_unreadable};
 use sdg_weights_conversion::sha256_of;
 
 /// Name of the file with the symmetries of parts for which `--symmetry` does not apply. Each line has a part's name and
@@ -20,7 +20,7 @@ const MAX_SYMMETRIES_BYTES: u64 = 1 << 20;
 #[derive(Debug)]
 pub struct DemonstrationFolder {
     pub parts: Vec<PartDemonstrations>,
-    /// Photos without marks, and the reasons why they are left out.
+    /// Photos without marks or of a format that is not read, and the reasons why they are left out.
     pub left_out: Vec<(String, String)>,
 }
 
@@ -45,6 +45,10 @@ impl DemonstrationFolder {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
         let mut left_out = Vec::new();
         let mut add = |name: String, photo: PathBuf, is_own_part: bool| -> Result<()> {
+            if let Some(why) = why_unreadable(&photo) {
+                left_out.push((photo.display().to_string(), why));
+                return Ok(());
+            }
             let marks = match beside_photo(&photo) {
                 Ok(marks) => marks,
                 Err(error) => {
@@ -72,15 +76,18 @@ impl DemonstrationFolder {
             let name = name.and_then(|name| name.to_str());
             name.map(str::to_owned).with_context(|| format!("{}: expected a name in UTF-8", path.display()))
         };
+        let is_photo = |path: &Path| {
+            sdg_files::has_extension(path, &IMAGE_EXTENSIONS) || sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)
+        };
         for entry in sdg_files::entries(folder)? {
             if entry.is_dir() {
                 let name = name_of(&entry, false)?;
                 for photo in sdg_files::entries(&entry)? {
-                    if sdg_files::has_extension(&photo, &IMAGE_EXTENSIONS) {
+                    if is_photo(&photo) {
                         add(name.clone(), photo, false)?;
                     }
                 }
-            } else if sdg_files::has_extension(&entry, &IMAGE_EXTENSIONS) {
+            } else if is_photo(&entry) {
                 add(name_of(&entry, true)?, entry, true)?;
             }
         }
@@ -130,13 +137,16 @@ impl PartDemonstrations {
         sdg_inputs::read_image(&self.files[0].0)
     }
 
-    /// Hashes of the contents of the part's files.
+    /// Hashes of the contents of the part's files, including the files that complete the marks, such as data.yaml.
     ///
     /// # Errors
     /// Files cannot be read.
     pub fn sha256(&self) -> Result<Vec<String>> {
-        let paths = self.files.iter().flat_map(|(photo, marks)| [photo, marks]);
-        paths.map(|path| sha256_of(path).with_context(|| path.display().to_string())).collect()
+        let files = |(photo, marks): &(PathBuf, PathBuf)| {
+            [Some(photo.clone()), Some(marks.clone()), file_beside(marks)].into_iter().flatten()
+        };
+        let paths = self.files.iter().flat_map(files);
+        paths.map(|path| sha256_of(&path).with_context(|| path.display().to_string())).collect()
     }
 }
 
@@ -159,5 +169,34 @@ mod tests {
         let found: Vec<_> = read.parts.iter().map(|part| (part.name.as_str(), part.symmetry)).collect();
         let [two, four] = [2, 4].map(|times| Some(RotationalSymmetry::Fold(times)));
         assert_eq!(found, [("key", four), ("rod end", two)]);
+    }
+
+    #[test]
+    fn a_photo_of_a_format_that_is_not_read_is_left_out_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+        write("key.png", b"");
+        write("key.json", b"");
+        write("lever.heic", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic");
+        write("lever.json", b"");
+        let read = DemonstrationFolder::read(folder.path(), |text| Err(text.to_owned())).unwrap();
+        assert_eq!(read.parts.len(), 1);
+        let [(name, why)] = read.left_out.as_slice() else { panic!("{:?}", read.left_out) };
+        assert!(name.ends_with("lever.heic") && why.contains("HEIC"), "{name}: {why}");
+    }
+
+    #[test]
+    fn a_changed_data_yaml_changes_the_hashes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [photo, marks, names] = ["key.png", "key.txt", "data.yaml"].map(|name| folder.path().join(name));
+        fs::write(&photo, "").unwrap();
+        fs::write(&marks, "0 0.5 0.5 0.25 0.5\n").unwrap();
+        let part = PartDemonstrations { name: "key".to_owned(), files: vec![(photo, marks)], symmetry: None };
+        let [first, second] = ["names: [key]\n", "names: [lock]\n"].map(|text| {
+            fs::write(&names, text).unwrap();
+            part.sha256().unwrap()
+        });
+        assert_eq!((first.len(), &first[..2]), (3, &second[..2]));
+        assert_ne!(first, second);
     }
 }

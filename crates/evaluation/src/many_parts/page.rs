@@ -109,7 +109,7 @@ fn all_parts(findings: &Findings, photos: &[RgbImage]) -> Section {
                 row.push(Cell::text("not taught"));
                 row.extend((0..8).map(|_| Cell::missing()));
             }
-            PartOutcome::Taught { seconds, found, parts, wrong, false_alarms, without_part, median } => {
+            PartOutcome::Taught { seconds, found, parts, wrong, false_alarms, without_part, median, .. } => {
                 let of_median = |at: usize| median.map_or(Cell::missing(), |median| Cell::number(median[at], 1));
                 row.extend([
                     Cell::number(*seconds, 1),

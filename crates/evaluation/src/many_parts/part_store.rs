@@ -44,6 +44,9 @@ pub enum PartOutcome {
         without_part: usize,
         /// Median errors of the found parts: distance in pixels of the photo, and angle in degrees.
         median: Option<[f64; 2]>,
+        /// Numbers of the photos, from 1, whose grasp points in another direction than that of the first photo.
+        #[serde(default)]
+        turned_photos: Vec<usize>,
     },
     Failed {
         /// The reason of the failure, on one line.
@@ -63,6 +66,7 @@ impl PartOutcome {
             false_alarms: false_alarms.count,
             without_part: false_alarms.of,
             median: figures.median_errors(),
+            turned_photos: figures.turned().iter().map(|turned| turned.photo).collect(),
         }
     }
 
@@ -98,7 +102,8 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key.
+    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key, or if
+    /// the model file is missing.
     ///
     /// # Errors
     /// The record cannot be read or is damaged.
@@ -109,21 +114,22 @@ impl PartStore {
         }
         let record: PartRecord = serde_json::from_slice(&sdg_files::read(&path, MAX_RECORD_BYTES)?)
             .with_context(|| format!("{}: expected the record of a part", path.display()))?;
-        Ok((record.key == *key).then_some(record.outcome))
+        let is_missing = matches!(record.outcome, PartOutcome::Taught { .. }) && !self.model_file(part).exists();
+        Ok((record.key == *key && !is_missing).then_some(record.outcome))
     }
 
-    /// Stores the outcome of a part. Without a model, an earlier model of the part is removed. The record is written
-    /// last, because it states that the model is complete.
+    /// Stores the outcome of a part. Without a model, an earlier model of the part is renamed to `NAME.sdg.before`. The
+    /// record is written last, because it states that the model is complete.
     ///
     /// # Errors
-    /// Files cannot be written or removed.
+    /// Files cannot be written or renamed.
     pub fn write(&self, part: &str, model: Option<&[u8]>, record: &PartRecord) -> Result<()> {
         let path = self.model_file(part);
         match model {
             Some(bytes) => write_atomically(&path, bytes)?,
-            None => match fs::remove_file(&path) {
+            None => match fs::rename(&path, path.with_extension("sdg.before")) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(error).with_context(|| format!("{}: cannot remove", path.display()));
+                    return Err(error).with_context(|| format!("{}: cannot rename", path.display()));
                 }
                 _ => {}
             },
@@ -139,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_teaching_leaves_no_earlier_model() {
+    fn a_failed_teaching_renames_the_earlier_model() {
         let folder = tempfile::tempdir().unwrap();
         let store = PartStore::open(folder.path()).unwrap();
         let outcome = PartOutcome::Failed { why: "nothing learnt".to_owned() };
@@ -148,6 +154,7 @@ mod tests {
             store.write("lever", model, &record).unwrap();
             assert_eq!(store.model_file("lever").exists(), model.is_some());
         }
+        assert_eq!(fs::read(store.model_file("lever").with_extension("sdg.before")).unwrap(), b"model");
         assert_eq!(store.read("lever", &Value::Null).unwrap(), Some(outcome));
     }
 }

@@ -87,7 +87,7 @@ impl TeachOptions {
     /// # Errors
     /// [`GraspError::NeedsBaseWeights`](crate::GraspError::NeedsBaseWeights) if the preset starts from weights and
     /// this build contains none.
-    pub(super) fn with_start_read(&self) -> Result<Self> {
+    pub fn with_start_read(&self) -> Result<Self> {
         let Some(taught_network) = self.taught_network() else { return Ok(self.clone()) };
         let start = self.start.read(self.preset, &taught_network)?;
         Ok(Self { start, ..self.clone() })

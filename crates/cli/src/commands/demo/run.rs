@@ -67,7 +67,10 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
         place: None,
     };
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
-    let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);
+    let mut command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);
+    if let Some(secs) = args.time_budget {
+        command += &format!(" --time-budget {secs}");
+    }
     let page = RunPage { model: &model, object: &object, rehearsed: &rehearsed, command: &command };
     let taught_here = TaughtHere {
         demonstration: &demonstration,

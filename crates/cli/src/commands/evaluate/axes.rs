@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
-use sdg_evaluation::Store;
 use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, difference_lines, summary_lines};
+use sdg_evaluation::{Store, quoted};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -96,7 +96,7 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
         option("search-points", &points);
     }
     if let Some(folder) = &args.against {
-        option("against", &folder.display());
+        option("against", &quoted(&folder.display().to_string()));
     }
     option("preset", &args.preset);
     if let Some(steps) = args.steps {

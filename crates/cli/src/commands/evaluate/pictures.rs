@@ -1,10 +1,10 @@
 //! `sdg evaluate --pictures`: tests a taught model on the user's own labelled pictures.
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, TestedFolder, Totals, page, summary, to_json};
+use sdg_evaluation::quoted;
 use sdg_grasp::Verification;
 use sdg_inputs::camera_files;
 
@@ -55,14 +55,17 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
 /// The command that reproduces the results.
 fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
-    let mut command = format!("sdg evaluate --pictures {} --grasp-model {}", folder.display(), model_file.display());
-    // Writing to a string cannot fail.
-    let _ = write!(command, " --min-score {}", args.min_score);
+    let mut command = "sdg evaluate".to_owned();
+    let mut option = |name: &str, value: &str| command += &format!(" --{name} {}", quoted(value));
+    option("pictures", &folder.display().to_string());
+    option("grasp-model", &model_file.display().to_string());
+    option("min-score", &args.min_score.to_string());
     if let Some(camera) = &args.camera {
-        let _ = write!(command, " --camera {}", camera.display());
+        option("camera", &camera.display().to_string());
     }
     if let Some(label) = &args.label {
-        let _ = write!(command, " --label {label}");
+        option("label", label);
     }
+    command += &ComputeArgs { device: args.device }.in_command();
     if args.no_verify { command + " --no-verify" } else { command }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, RehearsedPlace};
 use sdg_evaluation::run_page::{self, RunPage};
-use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes, attempt_in_words, run_json};
+use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes, attempt_in_words, quoted, run_json};
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{GraspError, GraspModel, Verification};
 use sdg_inputs::camera_files::CameraFile;
@@ -60,26 +60,39 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     rehearsal.check_room().map_err(|error| Usage(format!("--place: {error}")))?;
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
-    let mut command = format!("sdg rehearse --grasp-model {model_file}");
-    if let Some(object) = &args.object {
-        command += &format!(" --object {object}");
-    }
-    let OwnPartArgs { height_mm, length_mm, mass_g, friction } = args.own_part;
-    for (option, value) in
-        [("height-mm", height_mm), ("length-mm", length_mm), ("mass-g", mass_g), ("friction", friction)]
-    {
-        command += &value.map(|value| format!(" --{option} {value}")).unwrap_or_default();
-    }
-    command += &format!(" --attempts {} --seed {}", args.attempts, args.seed);
-    if let Some(camera) = &args.camera {
-        command += &format!(" --camera {}", camera.display());
-    }
-    if let (Some(place), Some(workcell)) = (&args.place, &args.workcell) {
-        command += &format!(" --place {place} --workcell {}", workcell.display());
-    }
+    let command = command(args);
     let page = RunPage { model: &model, object: &object, rehearsed: &rehearsed, command: &command };
     let report = run_page::rehearsal(&page)?.write(&args.out)?;
     finish(&page, None, &report, args.json)
+}
+
+/// The command that repeats the attempts.
+fn command(args: &RehearseArgs) -> String {
+    let mut command = "sdg rehearse".to_owned();
+    let mut option = |name: &str, value: &str| command += &format!(" --{name} {}", quoted(value));
+    option("grasp-model", &args.grasp_model.display().to_string());
+    if let Some(object) = &args.object {
+        option("object", object);
+    }
+    let OwnPartArgs { height_mm, length_mm, mass_g, friction } = args.own_part;
+    for (name, value) in
+        [("height-mm", height_mm), ("length-mm", length_mm), ("mass-g", mass_g), ("friction", friction)]
+    {
+        if let Some(value) = value {
+            option(name, &value.to_string());
+        }
+    }
+    option("attempts", &args.attempts.to_string());
+    option("seed", &args.seed.to_string());
+    if let Some(camera) = &args.camera {
+        option("camera", &camera.display().to_string());
+    }
+    if let (Some(place), Some(workcell)) = (&args.place, &args.workcell) {
+        option("place", place);
+        option("workcell", &workcell.display().to_string());
+    }
+    command += &args.compute.in_command();
+    if args.no_verify { command + " --no-verify" } else { command }
 }
 
 /// The part that the model was taught from.
@@ -138,4 +151,22 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         println!("report: {}", report.display());
     }
     Ok(if rehearsed.found_nothing() { Outcome::NothingToGrasp } else { Outcome::Done })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Args, Command};
+    use clap::Parser;
+
+    #[test]
+    fn the_command_of_the_page_repeats_the_attempts() {
+        let line = "sdg rehearse --device wgpu --no-verify --grasp-model";
+        let line = line.split(' ').chain(["my part.sdg"]);
+        let Command::Rehearse(args) = Args::try_parse_from(line).unwrap().command else { panic!("another command") };
+        assert_eq!(
+            command(&args),
+            "sdg rehearse --grasp-model 'my part.sdg' --attempts 10 --seed 1 --device wgpu --no-verify"
+        );
+    }
 }

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use super::unit_list::{ListedUnit, UnitKind};
 use super::worker::{Worker, unix_secs};
+use crate::shell_word::quoted;
 
 /// The script of one task.
 const UNIT_JOB: &str = include_str!("unit_job.sh");
@@ -97,15 +98,6 @@ fn script_of_submission(job: &SlurmJob, units: &[ListedUnit], marker: &str) -> S
     script
 }
 
-/// Quotes a word for the shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,=:+%".contains(letter);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
 /// The number of cores that Slurm allocated, or else the machine's.
 pub fn cores() -> usize {
     let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
@@ -169,12 +161,5 @@ mod tests {
                 .contains("teach_2=$(submit --job-name=sdg-teach --array=0-499 \"$folder/slurm/unit.sh\" teach 2000)")
         );
         assert_eq!(script.matches("--array=0-999").count(), 2);
-    }
-
-    #[test]
-    fn words_are_quoted_for_the_shell() {
-        assert_eq!(quoted("a-b.c/d"), "a-b.c/d");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
-        assert_eq!(quoted(""), "''");
     }
 }
