@@ -9,6 +9,8 @@ use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, K
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Precision, Source, sha256_of};
 use sha2::{Digest, Sha256};
 
+use crate::forged::{array, cat, text};
+
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
@@ -98,6 +100,21 @@ fn every_value_of_detectron2_s_files_arrives_under_its_name() {
         assert!(report["licence_note"].contains("CC BY-SA 3.0"));
         assert_eq!((&*report["source_author"], &*report["preset"]), ("golden", "narrow"));
     }
+}
+
+#[test]
+fn torchvision_s_backbone_in_detectron2_s_names_has_torchvision_s_licence() {
+    let folder = tempfile::tempdir().unwrap();
+    let [from, out] = ["torchvision.pkl", "out.safetensors"].map(|name| folder.path().join(name));
+    let author = cat(&[&text("__author__"), &text("torchvision")]);
+    let stem = cat(&[&text("stem.conv1.weight"), &array(&[2, 3, 7, 7], "f4", "<", &[0; 4 * 2 * 3 * 7 * 7])]);
+    fs::write(&from, cat(&[b"\x80\x04}(", &author, &stem, b"u."])).unwrap();
+    let target = Architecture { backbone: narrow(1).backbone, heads: None };
+    let others = ["stem.conv1.norm", "res2", "res3", "res4", "res5"].map(|part| format!("backbone.bottom_up.{part}"));
+    let (mut source, checkpoint, conversion) = planned(&from, &target, &others.each_ref().map(String::as_str));
+    conversion.write(&checkpoint, &mut source, [&from, &out], Precision::F32, &BTreeMap::new()).unwrap();
+    let written = Checkpoint::read(&mut Source::open(&out).unwrap()).unwrap();
+    assert!(written.metadata["licence_note"].contains("torchvision's code"), "{:?}", written.metadata);
 }
 
 #[test]

@@ -99,11 +99,12 @@ pub fn read(
 /// Checks the channel order and the range of the input: a network's weights are useless for any other input.
 fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let naming = naming_of(checkpoint)?;
-    let made_for = match (checkpoint.metadata.get("network"), naming) {
-        (Some(network), Naming::Ours) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
+    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours);
+    let made_for = match (stored, preset_for(checkpoint, naming)) {
+        (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
+        (None, Some(preset)) => preset_of_kind(preset, kind_of(network))?,
         // A file of this project without this information cannot be checked.
-        (None, Naming::Ours) => return Ok(()),
-        _ => preset_of_kind(preset_for(naming)?, kind_of(network))?,
+        (None, None) => return Ok(()),
     };
     let (expected, found) = (&network.input, &made_for.input);
     let says = |input: &ImageTransformConfig| (input.channel_order, input.pixel_range, input.mean, input.std);
@@ -120,4 +121,25 @@ fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_detection::presets::{RcnnKind, r50_detectron2, r50_torchvision};
+
+    /// A file of one weight, as Detectron2's convert-torchvision-to-d2.py and numpy pickle it.
+    const TORCHVISION_IN_DETECTRON2_NAMES: &[u8] = b"\x80\x04}(\x8c\x0a__author__\x8c\x0btorchvision\
+        \x8c\x11stem.conv1.weightcnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R\
+        (K\x01(K\x01tcnumpy\ndtype\n\x8c\x02f4\x89\x88\x87R(K\x03\x8c\x01<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb\
+        \x89B\x04\x00\x00\x00\x00\x00\x00\x00tbu.";
+
+    #[test]
+    fn torchvision_s_backbone_in_detectron2_s_names_is_for_torchvision_s_input() {
+        let checkpoint = Checkpoint::read(&mut Source::from_bytes(TORCHVISION_IN_DETECTRON2_NAMES)).unwrap();
+        let kind = RcnnKind::Faster { num_classes: 1 };
+        check_input(&checkpoint, &r50_torchvision(kind)).unwrap();
+        let refused = check_input(&checkpoint, &r50_detectron2(kind)).unwrap_err().to_string();
+        assert!(refused.contains("torchvision's for r50-torchvision"), "{refused}");
+    }
 }

@@ -14,12 +14,13 @@ use sdg_weights_conversion::{Checkpoint, Conversion, Naming, is_backbone_alone, 
 
 use crate::base_weights::open;
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
+use crate::error::ConfigError;
 
 /// The detector of a checkpoint: given by a configuration or a preset's name, stated in the file, or derived from the
 /// parameters' names.
 ///
 /// # Errors
-/// The names are unknown or match no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
+/// The names are unknown or match no preset; [`ConfigError`] if a configuration would help.
 pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_name: Option<&str>) -> Result<RcnnConfig> {
     if let Some(config) = config {
         return Ok(config);
@@ -29,7 +30,7 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
     match (stored, preset_name) {
         (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
         (None, Some(name)) => preset(name, checkpoint),
-        (None, None) => preset(preset_for(naming)?, checkpoint),
+        (None, None) => preset(preset_for(checkpoint, naming).ok_or(ConfigError::OwnNames)?, checkpoint),
     }
 }
 
