@@ -69,6 +69,20 @@ impl fmt::Display for Naming {
 }
 
 impl Naming {
+    const ALL: [Self; 6] = [
+        Self::Ours,
+        Self::Detectron2,
+        Self::Detectron2Backbone,
+        Self::Torchvision,
+        Self::TorchvisionResnet,
+        Self::Caffe2Resnet,
+    ];
+
+    /// The scheme with this text, as displayed and as stored in a converted file.
+    pub(crate) fn from_text(text: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|naming| naming.to_string() == text)
+    }
+
     /// Recognises the scheme by typical names, which are checked in order.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
         let any = |test: &dyn Fn(&str) -> bool| names.clone().any(test);

@@ -21,7 +21,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::checkpoint::Checkpoint;
-use crate::conversion::{Conversion, Planned};
+use crate::conversion::{Conversion, Planned, source_of};
 use crate::digest::sha256_of;
 use crate::error::{Result, WeightsError, printable};
 use crate::naming::Program;
@@ -107,17 +107,17 @@ impl Conversion {
         extra: &BTreeMap<String, String>,
     ) -> BTreeMap<String, String> {
         let report = self.report();
-        let program = report.naming.program(checkpoint.author.as_deref());
+        let (naming, author) = source_of(checkpoint, report.naming);
         let mut metadata = extra.clone();
         let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
         put("weights_version", WEIGHTS_VERSION.to_owned());
         put("source_file", printable(&from.file_name().unwrap_or_default().to_string_lossy()));
         put("source_sha256", sha256.to_owned());
         put("source_format", checkpoint.format.to_string());
-        put("source_names", report.naming.to_string());
-        put("licence_note", licence_note(program).to_owned());
-        if let Some(author) = &checkpoint.author {
-            put("source_author", author.clone());
+        put("source_names", naming.to_string());
+        put("licence_note", licence_note(naming.program(author)).to_owned());
+        if let Some(author) = author {
+            put("source_author", author.to_owned());
         }
         if !report.reinitialized.is_empty() {
             put("reinitialized", report.reinitialized.join(" "));

@@ -132,10 +132,12 @@ fn half_precision_rounds_kernels_and_leaves_vectors() {
         let tolerance = |value: f32| if applied.shape.len() < 2 { 0.0 } else { value.abs() / 2048.0 + 3e-8 };
         assert!(exact.iter().zip(&rounded).all(|(e, r)| (e - r).abs() <= tolerance(*e)), "{}", applied.name);
     }
-    // A converted file can be converted again: the names are now ours.
+    // A converted file can be converted again: the names are now ours, and the metadata still describe the first file.
     let again = folder.path().join("again.safetensors");
     let twice = convert(&out, &narrow_keypoint(), &again, Precision::F16);
-    assert_eq!(twice.metadata["source_names"], "this project");
+    let source = ["source_names", "source_author"].map(|key| &*twice.metadata[key]);
+    assert_eq!(source, ["Detectron2", "golden"]);
+    assert_eq!(twice.metadata["licence_note"], half.metadata["licence_note"]);
     assert_eq!(twice.tensors.len(), half.tensors.len());
 }
 

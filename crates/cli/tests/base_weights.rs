@@ -164,6 +164,10 @@ fn resnets_of_three_depths_fill_a_backbone_straight_and_converted() {
         );
         let converted = assert_fills_backbone(&ours, &network, &[]);
         assert_eq!(converted.parameters, straight.parameters, "{model}");
+        // Our names hide the program, but not the input that the weights are for.
+        let other = r50_detectron2(RcnnKind::Faster { num_classes: 1 });
+        let refused = format!("{:#}", base_weights::read(&ours, &other, &[], &mut |_| Ok(())).unwrap_err());
+        assert!(refused.contains("torchvision's for r50-torchvision"), "{model}: {refused}");
     }
 }
 

@@ -97,7 +97,7 @@ pub fn read(
 }
 
 /// Checks the channel order and the range of the input: a network's weights are useless for any other input.
-fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
+pub(crate) fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let naming = naming_of(checkpoint)?;
     let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours);
     let made_for = match (stored, preset_for(checkpoint, naming)) {
@@ -110,7 +110,7 @@ fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let says = |input: &ImageTransformConfig| (input.channel_order, input.pixel_range, input.mean, input.std);
     if says(expected) != says(found) {
         bail!(
-            "the weights are for images as {:?} in {:?} with mean {:?}, the preset uses {:?} in {:?} with mean {:?}: \
+            "the weights are for images as {:?} in {:?} with mean {:?}, the detector uses {:?} in {:?} with mean {:?}: \
              Detectron2's weights are for r50-detectron2, torchvision's for r50-torchvision",
             found.channel_order,
             found.pixel_range,

@@ -10,7 +10,7 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind, RoiHeadsConfig};
 use sdg_detection::presets::{self, RcnnKind};
 use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, KeypointHead, MaskHead, Norm};
-use sdg_weights_conversion::{Architecture, Checkpoint, Naming, Program, SecondStage, naming_of};
+use sdg_weights_conversion::{Architecture, Checkpoint, Naming, Program, SecondStage, naming_of, source_of};
 
 use crate::error::ConfigError;
 
@@ -69,10 +69,11 @@ pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig, ConfigEr
     }
 }
 
-/// The preset whose numerics are those of a checkpoint's program. `None` for a file with this project's names, which
-/// are the same for every preset.
+/// The preset whose numerics are those of a checkpoint's program. `None` for a file with this project's names that does
+/// not say where its weights come from: the names are the same for every preset.
 pub fn preset_for(checkpoint: &Checkpoint, naming: Naming) -> Option<&'static str> {
-    naming.program(checkpoint.author.as_deref()).map(|program| match program {
+    let (naming, author) = source_of(checkpoint, naming);
+    naming.program(author).map(|program| match program {
         Program::Detectron2 => "r50-detectron2",
         Program::Torchvision => "r50-torchvision",
     })
