@@ -202,7 +202,7 @@ fn parts_of(expected: &BTreeMap<String, Vec<usize>>) -> Vec<String> {
 }
 
 /// Whether a parameter belongs to a part: `roi_heads.box` does not contain `roi_heads.box_head.fc1.weight`.
-fn is_part_of(name: &str, part: &str) -> bool {
+pub fn is_part_of(name: &str, part: &str) -> bool {
     let part = part.trim_end_matches('.');
     name.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }

@@ -51,7 +51,7 @@ mod zip_archive;
 
 pub use architecture::Architecture;
 pub use checkpoint::{Checkpoint, FileFormat};
-pub use conversion::{Conversion, ParameterValues, is_backbone_alone, naming_of, source_of};
+pub use conversion::{Conversion, ParameterValues, is_backbone_alone, is_part_of, naming_of, source_of};
 pub use digest::sha256_of;
 pub use element::ElementType;
 pub use error::{Result, WeightsError};

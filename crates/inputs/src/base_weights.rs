@@ -8,7 +8,7 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::ImageTransformConfig;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, TeachOptions};
 use sdg_layers::state_dict::{StateDict, WeightTensor};
-use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, naming_of, sha256_of};
+use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, is_part_of, naming_of, sha256_of};
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
 
@@ -18,12 +18,12 @@ pub type Origin = BTreeMap<String, String>;
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters whose names begin
-/// with an entry of `reinitialized` are left out. `None` if the file is of another kind, or the taught model has no
-/// network.
+/// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters of the parts in
+/// `reinitialized`, such as `roi_heads.box_predictor`, are left out. `None` if the file is of another kind, or the
+/// taught model has no network.
 ///
 /// # Errors
-/// The file cannot be read, the weights are of another preset, or no parameter has a given prefix.
+/// The file cannot be read, the weights are of another preset, or the network has no such part.
 pub fn read_own(
     path: &Path,
     options: &TeachOptions,
@@ -38,11 +38,13 @@ pub fn read_own(
     let file = BaseWeightsFile::from_bytes(&sdg_files::read(path, MAX_OWN_BYTES)?).with_context(named)?;
     let sha256 = sha256_of(path).with_context(named)?;
     let mut weights = file.for_network(options.preset.name(), &network, sha256).with_context(named)?;
-    for prefix in reinitialized {
-        let names: Vec<String> = weights.parameters.keys().filter(|name| name.starts_with(prefix)).cloned().collect();
-        if names.is_empty() {
+    for part in reinitialized {
+        let names: Vec<String> = weights.parameters.keys().filter(|name| is_part_of(name, part)).cloned().collect();
+        // The file itself leaves some parts out, such as the predictor of its classes.
+        if names.is_empty() && !weights.reinitialized.iter().any(|name| is_part_of(name, part)) {
             bail!(
-                "{}: expected the beginning of the names of parameters to initialise randomly, found \"{prefix}\"",
+                "{}: expected a part of the network to initialise randomly, such as roi_heads.box_predictor, \
+                 found \"{part}\"",
                 path.display()
             );
         }
@@ -63,13 +65,13 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
-/// Reads the weights in `path` for `network`. Parameters whose names begin with an entry of `reinitialized` are left
-/// out. If the file contains only a backbone, the rest of the network is initialised randomly and need not be named.
+/// Reads the weights in `path` for `network`. Parameters of the parts in `reinitialized` are left out. If the file
+/// contains only a backbone, the rest of the network is initialised randomly and need not be named.
 ///
 /// `tell` receives the report of the conversion before the values are read.
 ///
 /// # Errors
-/// The file cannot be read, the weights are for another network or another image input, or a prefix fits no parameter.
+/// The file cannot be read, the weights are for another network or image input, or the network has no such part.
 pub fn read(
     path: &Path,
     network: &RcnnConfig,
