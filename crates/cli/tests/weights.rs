@@ -155,6 +155,16 @@ fn verification_knows_torchvision_s_numerics_from_detectron2_s() {
 }
 
 #[test]
+fn verification_of_a_file_without_a_detector_asks_for_an_option_that_it_has() {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../grasp/weights/edge.safetensors");
+    let [image, against] = ["input.png", "faster/expected.safetensors"].map(|n| golden(&format!("detectron2/{n}")));
+    let output = sdg_weights(&["verify", own.to_str().unwrap(), "--image", &image, "--against", &against]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("expected --config for a file with this project's names"), "{stderr}");
+}
+
+#[test]
 fn wrong_input_is_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str, content: &[u8]| {
