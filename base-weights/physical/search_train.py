@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 
 TAUGHT = (0, 4)  # exit statuses of `sdg teach` with which it has written a model
+SEARCHED = (0, 3)  # exit statuses of `sdg detect` with which it has searched all pictures
 
 
 def search(folder, sdg):
@@ -27,6 +28,9 @@ def search(folder, sdg):
         pictures = sorted(glob.glob(os.path.join(folder, "mixed_*.jpg")))
         detect = [sdg, "detect", "--grasp-model", model, "--json", "--all", *pictures]
         found = subprocess.run(detect, capture_output=True, text=True)
+        if found.returncode not in SEARCHED:
+            print(folder, found.stderr[-200:], flush=True)
+            return
     out = os.path.join(folder, "found.jsonl")
     # Renamed when complete, so an interrupted run leaves no incomplete file.
     with open(out + ".tmp", "w") as file:

@@ -37,13 +37,16 @@ impl FileFormat {
     /// Bytes of no supported format; the message gives their apparent format.
     pub fn detect(source: &mut Source) -> Result<Self> {
         let start = source.read_span(Span { offset: 0, len: source.len().min(512) })?;
+        // First, because the length of its header can have the bytes with which a pickle begins, such as 640.
+        if safetensors_file::is_safetensors(&start, source.len()) {
+            return Ok(Self::Safetensors);
+        }
         if torch::is_legacy(&start) {
             return Ok(Self::TorchLegacy);
         }
         match start.as_slice() {
             [b'P', b'K', 3, 4, ..] => Ok(Self::TorchZip),
             [0x80, 2..=5, ..] => Ok(Self::NumpyPickle),
-            _ if safetensors_file::is_safetensors(&start, source.len()) => Ok(Self::Safetensors),
             _ => Err(WeightsError::NotACheckpoint { found: describe(&start) }),
         }
     }

@@ -179,6 +179,14 @@ pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
     })
 }
 
+/// The naming scheme and the author of a checkpoint's weights. For a file that was converted before, once or several
+/// times, they are in its metadata and describe the first file; if they are missing, the scheme is [`Naming::Ours`].
+pub fn source_of(checkpoint: &Checkpoint, naming: Naming) -> (Naming, Option<&str>) {
+    let entry = |key: &str| checkpoint.metadata.get(key).map(String::as_str);
+    let stored = entry("source_names").filter(|_| naming == Naming::Ours).and_then(Naming::from_text);
+    (stored.unwrap_or(naming), checkpoint.author.as_deref().or_else(|| entry("source_author")))
+}
+
 /// Whether a checkpoint contains a backbone and no detector: by its naming scheme or, if converted before, by its
 /// names.
 pub fn is_backbone_alone(checkpoint: &Checkpoint, naming: Naming) -> bool {
@@ -194,7 +202,7 @@ fn parts_of(expected: &BTreeMap<String, Vec<usize>>) -> Vec<String> {
 }
 
 /// Whether a parameter belongs to a part: `roi_heads.box` does not contain `roi_heads.box_head.fc1.weight`.
-fn is_part_of(name: &str, part: &str) -> bool {
+pub fn is_part_of(name: &str, part: &str) -> bool {
     let part = part.trim_end_matches('.');
     name.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }

@@ -51,11 +51,11 @@ mod zip_archive;
 
 pub use architecture::Architecture;
 pub use checkpoint::{Checkpoint, FileFormat};
-pub use conversion::{Conversion, ParameterValues, is_backbone_alone, naming_of};
+pub use conversion::{Conversion, ParameterValues, is_backbone_alone, is_part_of, naming_of, source_of};
 pub use digest::sha256_of;
 pub use element::ElementType;
 pub use error::{Result, WeightsError};
-pub use naming::Naming;
+pub use naming::{Naming, Program};
 pub use report::{Applied, Mismatch, Report};
 pub use self_description::SecondStage;
 pub use source::Source;

@@ -25,6 +25,19 @@ pub enum Naming {
     Caffe2Resnet,
 }
 
+/// The program whose weights a file contains. It determines the network's input image and the licence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Program {
+    /// Detectron2, which also uses Caffe2's classifiers.
+    Detectron2,
+    /// torchvision.
+    Torchvision,
+}
+
+/// The author in files of Detectron2's convert-torchvision-to-d2.py, which gives Detectron2's names to torchvision's
+/// ResNets.
+const TORCHVISION_AUTHOR: &str = "torchvision";
+
 /// Prefixes that do not belong to a name: torch's parallel training adds `module.`, this project's grasp models
 /// `network.`.
 pub(crate) fn strip_wrapper(name: &str) -> &str {
@@ -56,6 +69,20 @@ impl fmt::Display for Naming {
 }
 
 impl Naming {
+    const ALL: [Self; 6] = [
+        Self::Ours,
+        Self::Detectron2,
+        Self::Detectron2Backbone,
+        Self::Torchvision,
+        Self::TorchvisionResnet,
+        Self::Caffe2Resnet,
+    ];
+
+    /// The scheme with this text, as displayed and as stored in a converted file.
+    pub(crate) fn from_text(text: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|naming| naming.to_string() == text)
+    }
+
     /// Recognises the scheme by typical names, which are checked in order.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
         let any = |test: &dyn Fn(&str) -> bool| names.clone().any(test);
@@ -75,6 +102,16 @@ impl Naming {
             Some(Self::Caffe2Resnet)
         } else {
             None
+        }
+    }
+
+    /// The program of the weights in a file by this author; `None` for this project's names.
+    pub fn program(self, author: Option<&str>) -> Option<Program> {
+        match self {
+            Self::Detectron2Backbone if author == Some(TORCHVISION_AUTHOR) => Some(Program::Torchvision),
+            Self::Detectron2 | Self::Detectron2Backbone | Self::Caffe2Resnet => Some(Program::Detectron2),
+            Self::Torchvision | Self::TorchvisionResnet => Some(Program::Torchvision),
+            Self::Ours => None,
         }
     }
 

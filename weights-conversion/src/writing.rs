@@ -20,10 +20,10 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::checkpoint::Checkpoint;
-use crate::conversion::{Conversion, Planned};
+use crate::conversion::{Conversion, Planned, source_of};
 use crate::digest::sha256_of;
 use crate::error::{Result, WeightsError, printable};
-use crate::naming::Naming;
+use crate::naming::Program;
 use crate::source::Source;
 
 /// The version of the written metadata.
@@ -47,16 +47,16 @@ pub struct Written {
     pub source_sha256: String,
 }
 
-/// Known facts about the licence, by naming scheme; the file itself contains none.
-fn licence_note(naming: Naming) -> &'static str {
-    match naming {
-        Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => {
+/// Known facts about the licence, by program; the file itself contains none.
+fn licence_note(program: Option<Program>) -> &'static str {
+    match program {
+        Some(Program::Detectron2) => {
             "weights of Detectron2's model zoo are CC BY-SA 3.0; weights from elsewhere have their own licence"
         }
-        Naming::Torchvision | Naming::TorchvisionResnet => {
+        Some(Program::Torchvision) => {
             "torchvision's code is BSD-3-Clause; its weights may carry the terms of their training data"
         }
-        Naming::Ours => "as the file that this one was converted from",
+        None => "as the file that this one was converted from",
     }
 }
 
@@ -107,16 +107,17 @@ impl Conversion {
         extra: &BTreeMap<String, String>,
     ) -> BTreeMap<String, String> {
         let report = self.report();
+        let (naming, author) = source_of(checkpoint, report.naming);
         let mut metadata = extra.clone();
         let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
         put("weights_version", WEIGHTS_VERSION.to_owned());
         put("source_file", printable(&from.file_name().unwrap_or_default().to_string_lossy()));
         put("source_sha256", sha256.to_owned());
         put("source_format", checkpoint.format.to_string());
-        put("source_names", report.naming.to_string());
-        put("licence_note", licence_note(report.naming).to_owned());
-        if let Some(author) = &checkpoint.author {
-            put("source_author", author.clone());
+        put("source_names", naming.to_string());
+        put("licence_note", licence_note(naming.program(author)).to_owned());
+        if let Some(author) = author {
+            put("source_author", author.to_owned());
         }
         if !report.reinitialized.is_empty() {
             put("reinitialized", report.reinitialized.join(" "));

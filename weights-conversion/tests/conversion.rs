@@ -9,6 +9,8 @@ use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, K
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Precision, Source, sha256_of};
 use sha2::{Digest, Sha256};
 
+use crate::forged::{array, cat, text};
+
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
@@ -101,6 +103,21 @@ fn every_value_of_detectron2_s_files_arrives_under_its_name() {
 }
 
 #[test]
+fn torchvision_s_backbone_in_detectron2_s_names_has_torchvision_s_licence() {
+    let folder = tempfile::tempdir().unwrap();
+    let [from, out] = ["torchvision.pkl", "out.safetensors"].map(|name| folder.path().join(name));
+    let author = cat(&[&text("__author__"), &text("torchvision")]);
+    let stem = cat(&[&text("stem.conv1.weight"), &array(&[2, 3, 7, 7], "f4", "<", &[0; 4 * 2 * 3 * 7 * 7])]);
+    fs::write(&from, cat(&[b"\x80\x04}(", &author, &stem, b"u."])).unwrap();
+    let target = Architecture { backbone: narrow(1).backbone, heads: None };
+    let others = ["stem.conv1.norm", "res2", "res3", "res4", "res5"].map(|part| format!("backbone.bottom_up.{part}"));
+    let (mut source, checkpoint, conversion) = planned(&from, &target, &others.each_ref().map(String::as_str));
+    conversion.write(&checkpoint, &mut source, [&from, &out], Precision::F32, &BTreeMap::new()).unwrap();
+    let written = Checkpoint::read(&mut Source::open(&out).unwrap()).unwrap();
+    assert!(written.metadata["licence_note"].contains("torchvision's code"), "{:?}", written.metadata);
+}
+
+#[test]
 fn half_precision_rounds_kernels_and_leaves_vectors() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("half.safetensors");
@@ -115,10 +132,12 @@ fn half_precision_rounds_kernels_and_leaves_vectors() {
         let tolerance = |value: f32| if applied.shape.len() < 2 { 0.0 } else { value.abs() / 2048.0 + 3e-8 };
         assert!(exact.iter().zip(&rounded).all(|(e, r)| (e - r).abs() <= tolerance(*e)), "{}", applied.name);
     }
-    // A converted file can be converted again: the names are now ours.
+    // A converted file can be converted again: the names are now ours, and the metadata still describe the first file.
     let again = folder.path().join("again.safetensors");
     let twice = convert(&out, &narrow_keypoint(), &again, Precision::F16);
-    assert_eq!(twice.metadata["source_names"], "this project");
+    let source = ["source_names", "source_author"].map(|key| &*twice.metadata[key]);
+    assert_eq!(source, ["Detectron2", "golden"]);
+    assert_eq!(twice.metadata["licence_note"], half.metadata["licence_note"]);
     assert_eq!(twice.tensors.len(), half.tensors.len());
 }
 

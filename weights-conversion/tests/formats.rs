@@ -71,6 +71,20 @@ fn torch_tensors_of_both_formats() {
 }
 
 #[test]
+fn a_header_length_that_begins_like_a_pickle_is_no_pickle() {
+    // The lengths' first bytes are 0x80 and 2 to 5, as in pickles of these protocols.
+    for header_len in [640, 896, 1152, 1408, 640 + (1 << 16)] {
+        let mut header = br#"{"w":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}"#.to_vec();
+        header.resize(header_len, b' ');
+        let bytes = [(header_len as u64).to_le_bytes().as_slice(), &header, &0.5f32.to_le_bytes()].concat();
+        let mut source = Source::from_bytes(bytes);
+        let checkpoint = Checkpoint::read(&mut source).unwrap();
+        assert_eq!(checkpoint.format, FileFormat::Safetensors);
+        assert_eq!(checkpoint.tensors["w"].values(&mut source).unwrap(), [0.5]);
+    }
+}
+
+#[test]
 fn what_is_no_checkpoint_is_named() {
     for (bytes, name) in [
         (&b""[..], "an empty file"),

@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_detection::config::{BlockKind, RcnnConfig};
 use sdg_detection::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchvision};
-use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS};
+use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS, TeachOptions};
 use sdg_inputs::base_weights;
 use sdg_layers::state_dict;
 use serde_json::{Map, Value, json};
@@ -164,19 +164,28 @@ fn resnets_of_three_depths_fill_a_backbone_straight_and_converted() {
         );
         let converted = assert_fills_backbone(&ours, &network, &[]);
         assert_eq!(converted.parameters, straight.parameters, "{model}");
+        // Our names hide the program, but not the input that the weights are for.
+        let other = r50_detectron2(RcnnKind::Faster { num_classes: 1 });
+        let refused = format!("{:#}", base_weights::read(&ours, &other, &[], &mut |_| Ok(())).unwrap_err());
+        assert!(refused.contains("torchvision's for r50-torchvision"), "{model}: {refused}");
     }
 }
 
-#[test]
-fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
+/// The network with the widths of `msra_r50.pkl`.
+fn narrow_r50() -> RcnnConfig {
     let mut network = with_narrow_heads(r50_detectron2(RcnnKind::Faster { num_classes: 1 }));
     (network.backbone.stem_channels, network.backbone.res2_channels) = (2, 4);
     if let BlockKind::Bottleneck { inner_channels, .. } = &mut network.backbone.block {
         *inner_channels = 1;
     }
+    network
+}
+
+#[test]
+fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
     let path = fixture("msra_r50.pkl");
     // The bias of the stem belongs to a norm that is already folded; Detectron2 omits it as well.
-    let base = assert_fills_backbone(Path::new(&path), &network, &["conv1_b"]);
+    let base = assert_fills_backbone(Path::new(&path), &narrow_r50(), &["conv1_b"]);
     let values = |name: &str| &base.parameters[&format!("backbone.bottom_up.{name}")].values;
     assert_eq!(
         (&values("stem.conv1.norm.running_mean")[..], &values("stem.conv1.norm.running_var")[..]),
@@ -186,11 +195,8 @@ fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
     assert_eq!(values("stem.conv1.norm.weight"), &[0.25, 0.5]);
 }
 
-#[test]
-fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (own, out, demonstration) = (at("own.safetensors"), at("part.sdg"), demonstration());
+/// Base weights of this project for every head, except the scores of classes.
+fn write_own_weights(path: &Path) {
     let mut network = edge(NUM_KEYPOINTS);
     network.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
     let mut parameters = state_dict::export(&network.init(&Device::flex(), 3).unwrap());
@@ -198,8 +204,36 @@ fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
     let names = ["bias", "weight"].map(|name| format!("roi_heads.box_predictor.cls_score.{name}"));
     let origin = BTreeMap::from([("seed".to_owned(), "3".to_owned())]);
     let file = BaseWeightsFile { preset: "edge".into(), reinitialized: names.into(), parameters, origin };
-    fs::write(&own, file.to_bytes()).unwrap();
+    fs::write(path, file.to_bytes()).unwrap();
+}
 
+#[test]
+fn a_part_to_initialise_is_a_whole_name_in_our_weights_and_in_imported_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("own.safetensors");
+    write_own_weights(&own);
+    let imported = fixture("msra_r50.pkl");
+    let read = |part: &str| {
+        let parts = [part.to_owned()];
+        let own = base_weights::read_own(&own, &TeachOptions::new(1), &parts).map(|read| read.unwrap().0);
+        [own, base_weights::read(Path::new(&imported), &narrow_r50(), &parts, &mut |_| Ok(()))]
+    };
+    for refused in read("roi_heads.box") {
+        let refused = format!("{:#}", refused.unwrap_err());
+        assert!(refused.contains("found \"roi_heads.box\""), "{refused}");
+    }
+    // Our weights leave the scores out, and the imported ones have no heads.
+    for weights in read("roi_heads.box_predictor.cls_score") {
+        assert!(weights.unwrap().reinitialized.contains("roi_heads.box_predictor.cls_score.weight"));
+    }
+}
+
+#[test]
+fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (own, out, demonstration) = (at("own.safetensors"), at("part.sdg"), demonstration());
+    write_own_weights(Path::new(&own));
     let teach = |arguments: &[&str]| {
         let output = sdg(&[&["teach", "--demo", &demonstration, "--out", &out, "--steps", "2"], arguments].concat());
         (output.status.code(), text(output.stdout), text(output.stderr))

@@ -78,6 +78,25 @@ fn what_does_not_fit_is_listed_and_nothing_is_written() {
     assert_eq!(sdg_weights(&named).status.code(), Some(0));
 }
 
+#[test]
+fn a_detector_for_another_image_input_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("converted.safetensors");
+    let config = config(folder.path(), 1);
+    let mut other: Value = serde_json::from_slice(&fs::read(&config).unwrap()).unwrap();
+    other["numerics"] = json!("torchvision");
+    fs::write(&config, other.to_string()).unwrap();
+    let from = fixture("detectron2_keypoint.pkl");
+    let arguments = ["convert", &from, out.to_str().unwrap()];
+    for detector in [["--preset", "r50-torchvision"], ["--config", config.to_str().unwrap()]] {
+        let output = sdg_weights(&[&arguments[..], &detector].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains("Detectron2's weights are for r50-detectron2"), "{stderr}");
+    }
+    assert!(!out.exists());
+}
+
 /// The outputs of Detectron2 and torchvision.
 fn golden(name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden");
@@ -133,6 +152,16 @@ fn verification_knows_torchvision_s_numerics_from_detectron2_s() {
     assert_eq!(wrong.status.code(), Some(1));
     let failed = one_json(&wrong)["stages"].as_array().unwrap().iter().filter(|s| s["passed"] == false).count();
     assert!(failed > 10, "{failed} stages");
+}
+
+#[test]
+fn verification_of_a_file_without_a_detector_asks_for_an_option_that_it_has() {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../grasp/weights/edge.safetensors");
+    let [image, against] = ["input.png", "faster/expected.safetensors"].map(|n| golden(&format!("detectron2/{n}")));
+    let output = sdg_weights(&["verify", own.to_str().unwrap(), "--image", &image, "--against", &against]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("expected --config for a file with this project's names"), "{stderr}");
 }
 
 #[test]

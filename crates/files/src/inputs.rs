@@ -163,4 +163,17 @@ mod tests {
         fs::write(&camera, "").unwrap();
         write(&camera, b"<svg/>").unwrap();
     }
+
+    #[test]
+    fn a_model_whose_header_length_begins_like_a_picture_is_replaced_by_a_model() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.sdg");
+        let model = |header_len: u64| [header_len.to_le_bytes().as_slice(), b"{}"].concat();
+        // "P1" and "P2" as in PBM and PGM, and the beginning of an icon.
+        for header_len in [0x3150, 0x3250, 0x1_0000] {
+            fs::write(&path, model(header_len)).unwrap();
+            write(&path, &model(640)).unwrap();
+            write(&path, &model(header_len)).unwrap();
+        }
+    }
 }

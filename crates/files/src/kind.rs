@@ -29,9 +29,10 @@ pub(crate) fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
 fn kind_of(start: &[u8]) -> Option<String> {
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace())?;
     let kind = match (image::guess_format(start), first) {
+        // First, because the length of its header can have the bytes with which a picture begins: 12624 is "P1".
+        _ if start.get(8) == Some(&b'{') && start[4..8] == [0; 4] => "a model",
         (Ok(format), _) => return Some(format!("a picture ({format:?})")),
         _ if start.starts_with(b"%PDF") => "a PDF",
-        _ if start.get(8) == Some(&b'{') && start[4..8] == [0; 4] => "a model",
         (_, b'<') => "XML or HTML",
         (_, b'{' | b'[') => "JSON",
         _ if start.contains(&0) => "another file",

@@ -8,7 +8,7 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::ImageTransformConfig;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, TeachOptions};
 use sdg_layers::state_dict::{StateDict, WeightTensor};
-use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, naming_of, sha256_of};
+use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, is_part_of, naming_of, sha256_of};
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
 
@@ -18,12 +18,12 @@ pub type Origin = BTreeMap<String, String>;
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
 
-/// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters whose names begin
-/// with an entry of `reinitialized` are left out. `None` if the file is of another kind, or the taught model has no
-/// network.
+/// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters of the parts in
+/// `reinitialized`, such as `roi_heads.box_predictor`, are left out. `None` if the file is of another kind, or the
+/// taught model has no network.
 ///
 /// # Errors
-/// The file cannot be read, the weights are of another preset, or no parameter has a given prefix.
+/// The file cannot be read, the weights are of another preset, or the network has no such part.
 pub fn read_own(
     path: &Path,
     options: &TeachOptions,
@@ -38,11 +38,13 @@ pub fn read_own(
     let file = BaseWeightsFile::from_bytes(&sdg_files::read(path, MAX_OWN_BYTES)?).with_context(named)?;
     let sha256 = sha256_of(path).with_context(named)?;
     let mut weights = file.for_network(options.preset.name(), &network, sha256).with_context(named)?;
-    for prefix in reinitialized {
-        let names: Vec<String> = weights.parameters.keys().filter(|name| name.starts_with(prefix)).cloned().collect();
-        if names.is_empty() {
+    for part in reinitialized {
+        let names: Vec<String> = weights.parameters.keys().filter(|name| is_part_of(name, part)).cloned().collect();
+        // The file itself leaves some parts out, such as the predictor of its classes.
+        if names.is_empty() && !weights.reinitialized.iter().any(|name| is_part_of(name, part)) {
             bail!(
-                "{}: expected the beginning of the names of parameters to initialise randomly, found \"{prefix}\"",
+                "{}: expected a part of the network to initialise randomly, such as roi_heads.box_predictor, \
+                 found \"{part}\"",
                 path.display()
             );
         }
@@ -63,13 +65,13 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
-/// Reads the weights in `path` for `network`. Parameters whose names begin with an entry of `reinitialized` are left
-/// out. If the file contains only a backbone, the rest of the network is initialised randomly and need not be named.
+/// Reads the weights in `path` for `network`. Parameters of the parts in `reinitialized` are left out. If the file
+/// contains only a backbone, the rest of the network is initialised randomly and need not be named.
 ///
 /// `tell` receives the report of the conversion before the values are read.
 ///
 /// # Errors
-/// The file cannot be read, the weights are for another network or another image input, or a prefix fits no parameter.
+/// The file cannot be read, the weights are for another network or image input, or the network has no such part.
 pub fn read(
     path: &Path,
     network: &RcnnConfig,
@@ -97,19 +99,20 @@ pub fn read(
 }
 
 /// Checks the channel order and the range of the input: a network's weights are useless for any other input.
-fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
+pub(crate) fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
     let naming = naming_of(checkpoint)?;
-    let made_for = match (checkpoint.metadata.get("network"), naming) {
-        (Some(network), Naming::Ours) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
+    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours);
+    let made_for = match (stored, preset_for(checkpoint, naming)) {
+        (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\"")?,
+        (None, Some(preset)) => preset_of_kind(preset, kind_of(network))?,
         // A file of this project without this information cannot be checked.
-        (None, Naming::Ours) => return Ok(()),
-        _ => preset_of_kind(preset_for(naming)?, kind_of(network))?,
+        (None, None) => return Ok(()),
     };
     let (expected, found) = (&network.input, &made_for.input);
     let says = |input: &ImageTransformConfig| (input.channel_order, input.pixel_range, input.mean, input.std);
     if says(expected) != says(found) {
         bail!(
-            "the weights are for images as {:?} in {:?} with mean {:?}, the preset uses {:?} in {:?} with mean {:?}: \
+            "the weights are for images as {:?} in {:?} with mean {:?}, the detector uses {:?} in {:?} with mean {:?}: \
              Detectron2's weights are for r50-detectron2, torchvision's for r50-torchvision",
             found.channel_order,
             found.pixel_range,
@@ -120,4 +123,25 @@ fn check_input(checkpoint: &Checkpoint, network: &RcnnConfig) -> Result<()> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_detection::presets::{RcnnKind, r50_detectron2, r50_torchvision};
+
+    /// A file of one weight, as Detectron2's convert-torchvision-to-d2.py and numpy pickle it.
+    const TORCHVISION_IN_DETECTRON2_NAMES: &[u8] = b"\x80\x04}(\x8c\x0a__author__\x8c\x0btorchvision\
+        \x8c\x11stem.conv1.weightcnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R\
+        (K\x01(K\x01tcnumpy\ndtype\n\x8c\x02f4\x89\x88\x87R(K\x03\x8c\x01<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb\
+        \x89B\x04\x00\x00\x00\x00\x00\x00\x00tbu.";
+
+    #[test]
+    fn torchvision_s_backbone_in_detectron2_s_names_is_for_torchvision_s_input() {
+        let checkpoint = Checkpoint::read(&mut Source::from_bytes(TORCHVISION_IN_DETECTRON2_NAMES)).unwrap();
+        let kind = RcnnKind::Faster { num_classes: 1 };
+        check_input(&checkpoint, &r50_torchvision(kind)).unwrap();
+        let refused = check_input(&checkpoint, &r50_detectron2(kind)).unwrap_err().to_string();
+        assert!(refused.contains("torchvision's for r50-torchvision"), "{refused}");
+    }
 }

@@ -12,14 +12,15 @@ use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_weights_conversion::architecture::{Architecture, Backbone};
 use sdg_weights_conversion::{Checkpoint, Conversion, Naming, is_backbone_alone, naming_of};
 
-use crate::base_weights::open;
+use crate::base_weights::{check_input, open};
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
+use crate::error::ConfigError;
 
 /// The detector of a checkpoint: given by a configuration or a preset's name, stated in the file, or derived from the
 /// parameters' names.
 ///
 /// # Errors
-/// The names are unknown or match no preset; [`ConfigError`](crate::ConfigError) if a configuration would help.
+/// The names are unknown or match no preset; [`ConfigError`] if a configuration would help.
 pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_name: Option<&str>) -> Result<RcnnConfig> {
     if let Some(config) = config {
         return Ok(config);
@@ -29,7 +30,7 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
     match (stored, preset_name) {
         (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
         (None, Some(name)) => preset(name, checkpoint),
-        (None, None) => preset(preset_for(naming)?, checkpoint),
+        (None, None) => preset(preset_for(checkpoint, naming).ok_or(ConfigError::OwnNames)?, checkpoint),
     }
 }
 
@@ -37,7 +38,7 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
 /// a checkpoint of a backbone alone needs none.
 ///
 /// # Errors
-/// The errors of [`config_of`]; or the configuration cannot be read.
+/// The errors of [`config_of`]; the configuration cannot be read, or is for another image input than the weights.
 pub fn conversion_target(
     checkpoint: &Checkpoint,
     config: Option<&Path>,
@@ -49,6 +50,7 @@ pub fn conversion_target(
         return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
     }
     let config = config_of(checkpoint, config.map(read_config).transpose()?, preset)?;
+    check_input(checkpoint, &config)?;
     let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
     if let Some(preset) = preset {
         metadata.insert("preset".to_owned(), preset.to_owned());

@@ -10,7 +10,7 @@ use sdg_detection::RcnnConfig;
 use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind, RoiHeadsConfig};
 use sdg_detection::presets::{self, RcnnKind};
 use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, KeypointHead, MaskHead, Norm};
-use sdg_weights_conversion::{Architecture, Checkpoint, Naming, SecondStage, naming_of};
+use sdg_weights_conversion::{Architecture, Checkpoint, Naming, Program, SecondStage, naming_of, source_of};
 
 use crate::error::ConfigError;
 
@@ -69,16 +69,14 @@ pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig, ConfigEr
     }
 }
 
-/// The preset whose numerics are those of a checkpoint's program.
-///
-/// # Errors
-/// There is no preset for this program.
-pub fn preset_for(naming: Naming) -> Result<&'static str, ConfigError> {
-    match naming {
-        Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => Ok("r50-detectron2"),
-        Naming::Torchvision | Naming::TorchvisionResnet => Ok("r50-torchvision"),
-        Naming::Ours => Err(ConfigError::OwnNames),
-    }
+/// The preset whose numerics are those of a checkpoint's program. `None` for a file with this project's names that does
+/// not say where its weights come from: the names are the same for every preset.
+pub fn preset_for(checkpoint: &Checkpoint, naming: Naming) -> Option<&'static str> {
+    let (naming, author) = source_of(checkpoint, naming);
+    naming.program(author).map(|program| match program {
+        Program::Detectron2 => "r50-detectron2",
+        Program::Torchvision => "r50-torchvision",
+    })
 }
 
 /// Names and shapes of a detector's parameters, as determined by the configuration.

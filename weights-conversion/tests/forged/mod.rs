@@ -19,12 +19,12 @@ fn int(value: i64) -> Vec<u8> {
     cat(&[&[0x8a, 8], &value.to_le_bytes()])
 }
 
-/// A pickled numpy array as numpy writes it, of any shape, type and bytes.
-pub fn array_pickle(shape: &[i64], code: &str, order: &str, bytes: &[u8]) -> Vec<u8> {
+/// The pickle operations for a numpy array as numpy writes it, of any shape, type and bytes.
+pub fn array(shape: &[i64], code: &str, order: &str, bytes: &[u8]) -> Vec<u8> {
     let sizes: Vec<u8> = shape.iter().flat_map(|size| int(*size)).collect();
     let no_fields = b"NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb";
     let dtype = cat(&[b"cnumpy\ndtype\n", &text(code), b"\x89\x88\x87R(K\x03", &text(order), no_fields]);
-    let array = cat(&[
+    cat(&[
         b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R(K\x01(",
         &sizes,
         b"t",
@@ -33,8 +33,12 @@ pub fn array_pickle(shape: &[i64], code: &str, order: &str, bytes: &[u8]) -> Vec
         &(bytes.len() as u32).to_le_bytes(),
         bytes,
         b"tb",
-    ]);
-    dict_with("w", &array)
+    ])
+}
+
+/// A pickled dict of such an array.
+pub fn array_pickle(shape: &[i64], code: &str, order: &str, bytes: &[u8]) -> Vec<u8> {
+    dict_with("w", &array(shape, code, order, bytes))
 }
 
 /// A zip archive of uncompressed entries with correct checksums.

@@ -94,8 +94,8 @@ pub struct TeachArgs {
     /// this program
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
-    /// Initialise parameters with this prefix randomly in spite of --base-weights, such as roi_heads.box_predictor;
-    /// repeat for several
+    /// Initialise this part of the network randomly in spite of --base-weights, such as roi_heads.box_predictor; repeat
+    /// for several
     #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
     pub reinitialized: Vec<String>,
     /// Folder for a page on the teaching: photo and marks, samples, curves

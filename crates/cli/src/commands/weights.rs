@@ -106,12 +106,12 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     }
 }
 
-/// Adds the names of the options that the error concerns.
-fn in_options(error: anyhow::Error) -> anyhow::Error {
+/// Adds the names of the options that the error concerns; `detector` names those that describe the command's detector.
+fn in_options(error: anyhow::Error, detector: &str) -> anyhow::Error {
     match error.downcast_ref() {
         Some(ConfigError::UnknownPreset { .. }) => Usage(format!("--preset: {error}")).into(),
         Some(ConfigError::OwnNames) => {
-            Usage("expected --preset or --config for a file with this project's names".to_owned()).into()
+            Usage(format!("expected {detector} for a file with this project's names")).into()
         }
         _ => error,
     }
@@ -122,7 +122,8 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let named = || args.input.display().to_string();
     let (mut source, checkpoint) = open(&args.input)?;
     let target = conversion_target(&checkpoint, args.config.as_deref(), args.preset.as_deref());
-    let (architecture, metadata) = target.map_err(in_options).with_context(named)?;
+    let target = target.map_err(|error| in_options(error, "--preset or --config"));
+    let (architecture, metadata) = target.with_context(named)?;
     let conversion = Conversion::plan(&checkpoint, &architecture, &args.reinitialized).with_context(named)?;
     let precision = if args.f16 { Precision::F16 } else { Precision::F32 };
     let paths = [args.input.as_path(), args.output.as_path()];
@@ -203,7 +204,8 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     let config = args.config.as_deref().map(read_config).transpose()?;
     let image = sdg_inputs::read_image(&args.image)?;
     let device = devices::open(&args.compute)?;
-    let report = verify_checkpoint(&args.file, config, &image, &args.against, &device).map_err(in_options)?;
+    let verified = verify_checkpoint(&args.file, config, &image, &args.against, &device);
+    let report = verified.map_err(|error| in_options(error, "--config"))?;
     let mut stdout = std::io::stdout().lock();
     if args.json {
         writeln!(stdout, "{}", json!({"passed": report.passed(), "stages": report.stages}))?;
