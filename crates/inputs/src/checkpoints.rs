@@ -38,7 +38,8 @@ pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_nam
 /// a checkpoint of a backbone alone needs none.
 ///
 /// # Errors
-/// The errors of [`config_of`]; the configuration cannot be read, or is for another image input than the weights.
+/// The errors of [`config_of`]; the configuration cannot be read, or the preset is for another image input than the
+/// weights.
 pub fn conversion_target(
     checkpoint: &Checkpoint,
     config: Option<&Path>,
@@ -49,8 +50,12 @@ pub fn conversion_target(
         let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
         return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
     }
+    let is_configured = config.is_some();
     let config = config_of(checkpoint, config.map(read_config).transpose()?, preset)?;
-    check_input(checkpoint, &config)?;
+    // A configuration states the input of its own weights.
+    if !is_configured {
+        check_input(checkpoint, &config)?;
+    }
     let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
     if let Some(preset) = preset {
         metadata.insert("preset".to_owned(), preset.to_owned());
