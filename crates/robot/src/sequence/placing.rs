@@ -302,6 +302,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             .collect();
         self.known.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
+        let max_offset_m = max_offset_m(goal);
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
             let arrived = match (&self.cell.camera, self.cell.config.look_outs.first()) {
                 (CameraPose::OnFlange(_), _) => self.hover(&grasps, shift_m, GraspStep::Check),
@@ -321,7 +322,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
                 None => {
                     let apart = found.base_from_tcp.translation.vector - base_from_part.translation.vector;
-                    apart.xy().norm() <= MAX_PLACE_OFFSET_M
+                    apart.xy().norm() <= max_offset_m
                 }
             };
             if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
@@ -338,6 +339,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
 const MAX_VIEW_TURNS: usize = 4;
 /// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;
+
+/// Largest distance of a detection from its place, m: in a tray, a part that is nearer to another cell is that cell's.
+fn max_offset_m(goal: &PlaceGoal) -> f64 {
+    let half_pitches_m = goal.tray.iter().flat_map(|tray| tray.pitch_m.map(|pitch_m| 0.5 * pitch_m));
+    half_pitches_m.fold(MAX_PLACE_OFFSET_M, f64::min)
+}
 
 fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Check, why)

@@ -203,6 +203,35 @@ fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
     assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
 }
 
+/// Finds the part, but after it was put down, the part at this pose.
+struct Neighbour(Isometry3<f64>);
+
+impl PartFinder<Cell> for Neighbour {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, _cell: &mut Cell, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        Ok(Some(GraspTarget { base_from_tcp: self.0, jaw_width_m: 0.02, score: 0.9 }))
+    }
+}
+
+#[test]
+fn a_part_in_the_next_cell_of_a_narrow_tray_is_not_the_one_put_down() {
+    let kind = PlaceKind::Tray { cells: [2, 2], pitch_m: [0.028, 0.08] };
+    let [goal, next] = [1, 2].map(|number| Place { kind, ..tray() }.goal(number).unwrap());
+    let mut finder = Neighbour(next.base_from_part(0.02, 0.0));
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let (camera, config) = (CameraPose::InBase(Isometry3::identity()), config());
+    let report =
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &config, &goal, &PlacingConfig::default()).unwrap();
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part is not seen where it was put down"), "{why}");
+    let is_grasp = |action: &&PlannedAction| matches!(action, PlannedAction::Hand(HandCommand::Grasp { .. }));
+    assert_eq!(cell.arm.actions().iter().filter(is_grasp).count(), 1);
+}
+
 /// Records the steps that begin.
 struct Begun(Vec<GraspStep>);
 
