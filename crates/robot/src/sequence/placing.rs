@@ -11,13 +11,11 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
-use sdg_kinematics::{JointPath, JointVector};
 
 use super::carry::{Aim, BELOW_M, SOFT_WAY_M};
 use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
-use super::reach::above;
-use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
+use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
 use crate::camera_pose::CameraPose;
@@ -34,8 +32,8 @@ use crate::touch::{TouchDown, Touched};
 const RELEASING_SPEED_M_S: f64 = 0.05;
 /// Time that the arm stands still after the fingers have opened, s.
 const RELEASED_SECS: f64 = 0.2;
-/// Steps by which the ascent is shortened if the arm cannot reach the end of the ascent, m.
-const RETREAT_STEP_M: f64 = 0.05;
+/// The smallest sufficient ascent after the release if the arm cannot follow the whole ascent, m.
+const MIN_RETREAT_M: f64 = 0.05;
 
 /// Settings for putting a held part down.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,10 +257,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         self.robot.wait(RELEASED_SECS)?;
         self.passed(GraspStep::Release)?;
-        let start = self.robot.commanded()?;
-        let path = self.way_up(&start, placing.retreat_m)?;
-        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
-        let motion = fails_at(GraspStep::Release, planned)?;
+        let limits = self.cell.config.pace.approach_limits(self.robot.geometry());
+        let motion = self.plan_up([MIN_RETREAT_M, placing.retreat_m], &limits, GraspStep::Release)?;
         self.follow(motion, GraspStep::Release)?;
         Ok(part_from_tcp)
     }
@@ -271,18 +267,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
         let width_m = self.known.closed.map_or(0.0, |hand| hand.opening_m);
         release_opening_m(width_m, placing.release_margin_m, &self.robot.geometry().hand)
-    }
-
-    fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
-        let base_from_tcp = self.robot.geometry().forward(start);
-        let mut up_m = retreat_m;
-        loop {
-            match self.free_line(start, &above(&base_from_tcp, up_m))? {
-                Ok(path) => return Ok(path),
-                Err(_) if up_m > RETREAT_STEP_M + 1e-9 => up_m -= RETREAT_STEP_M,
-                Err(why) => return Err(Stop::Failed(GraspStep::Release, why)),
-            }
-        }
     }
 
     /// Measures with a picture where the part lies.

@@ -5,7 +5,7 @@ use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};
 use crate::planned_arm::{PlannedAction, PlannedArm};
-use crate::safety::{CheckedMotion, SafetyLimits};
+use crate::safety::{CheckedMotion, SafetyLimits, WorkspaceBox};
 use crate::sequence::{LookOut, grasp};
 use crate::watch::{StopReason, Watch};
 use sdg_kinematics::collision::{Obstacle, Shape};
@@ -154,6 +154,23 @@ fn a_part_lies_where_it_was_to_lie() {
         // The load is set while the part is held, and reset afterwards.
         assert_eq!(cell.loads_kg, [0.3, 0.0]);
     }
+}
+
+#[test]
+fn a_lift_is_shortened_until_it_stays_in_the_workspace() {
+    let above = Isometry3::translation(0.0, 0.0, 0.3) * lying(0.45, -0.1, 0.0);
+    let low = ArmGeometry::panda().inverse(&above, &ready_pose(), &Default::default()).unwrap().q;
+    let workspace = WorkspaceBox { min_m: Vector3::repeat(-1.0), max_m: Vector3::new(1.0, 1.0, 0.5) };
+    let limits = SafetyLimits { workspace: Some(workspace), ..SafetyLimits::default() };
+    let config = GraspConfig { look_outs: vec![LookOut::Joints(low)], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    cell.arm = PlannedArm::new(ArmGeometry::panda(), low, 0.08);
+    let mut robot = Robot::new(&mut cell, limits, Watch::default());
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let report = grasp(&mut robot, &mut Truth, &mut (), camera, &config).unwrap();
+    assert_eq!(report.outcome, GraspOutcome::Held);
+    // Instead of 0.45 m above the grasp: the flange is 0.10 m higher than the tcp.
+    assert!((cell.tcp().translation.z - 0.37).abs() < 1e-4, "{}", cell.tcp());
 }
 
 /// Finds nothing; a person presses the stop button during the first picture.
