@@ -1,7 +1,7 @@
 //! Carries the held part to above its place, in an orientation in which the fingers have room and the compliant descent
 //! is possible.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use sdg_geometry::RotationalSymmetry;
 use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
 
@@ -49,6 +49,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         // The hand opens at the place; the straight path is therefore planned for the open hand.
         self.known.opening_m = opening_m;
+        let [x, y] = goal.at_m;
+        self.known.support = Some(Point3::new(x, y, goal.surface_m));
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
             .map(|turn_rad| {
@@ -91,7 +93,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 return Ok(aim);
             }
         }
-        let [x, y] = goal.at_m;
         let why = why.unwrap_or_default();
         Err(Stop::Failed(GraspStep::Carry, format!("no path to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
     }

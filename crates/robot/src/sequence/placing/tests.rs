@@ -301,6 +301,26 @@ fn a_part_that_slides_is_taken_again_from_a_raised_place() {
 }
 
 #[test]
+fn a_low_part_is_put_onto_an_obstacle_and_taken_from_it() {
+    let shelf = Obstacle {
+        name: "shelf".to_owned(),
+        shape: Shape::Box { half_m: [0.1, 0.1, 0.015] },
+        base_from_obstacle: Isometry3::translation(0.4, -0.3, 0.015),
+    };
+    let place =
+        |at_m: [f64; 2], surface_m: f64| Place { at_m, surface_m, kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.008;
+    let onto = GraspConfig { obstacles: vec![shelf], ..config() };
+    let report = run(&mut cell, &onto, &place([0.4, -0.3], 0.03), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.038).abs() < 1e-4, "{}", cell.base_from_part);
+    let from = GraspConfig { surface_m: Some(0.03), ..onto };
+    let report = run(&mut cell, &from, &place([0.5, 0.1], 0.0), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+}
+
+#[test]
 fn a_part_on_a_raised_surface_is_put_down_onto_a_lower_one() {
     let mut cell = cell(Isometry3::identity());
     cell.base_from_part.translation.z = 0.04;
