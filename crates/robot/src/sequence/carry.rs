@@ -12,7 +12,7 @@ use crate::arm_state::ContactSensitivity;
 use crate::perception::GraspStep;
 use crate::place::PlaceGoal;
 use crate::room::same_turns_rad;
-use crate::surroundings::{Destination, Way};
+use crate::surroundings::{Destination, Surroundings, Way};
 
 /// Heights above a place at which a straight descent to it starts, m.
 const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
@@ -83,9 +83,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     Carried::Around(way) => way.approach.as_ref().map(|path| *path.end()),
                     Carried::Straight(approach) => Some(*approach.path.end()),
                 };
-                // A joint limit may end the descent before the contact in one orientation of the part and not in
-                // another.
-                if let Err(because) = end.map_or(Ok(()), |end| self.goes_on_down(&end)) {
+                // A joint limit or an obstacle may end the descent before the contact in one orientation of the part
+                // and not in another.
+                if let Some(end) = end
+                    && let Err(because) = self.goes_on_down(&end)?
+                {
                     why.get_or_insert(because);
                     continue;
                 }
@@ -133,11 +135,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Checks that the arm can descend from a configuration to the lowest possible contact; otherwise returns the
     /// reason.
-    fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
-        let arm = self.robot.geometry();
-        let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));
-        let line = arm.straight_path(from, &lowest, &LineOptions::default());
-        line.map(|_| ()).map_err(|error| error.to_string())
+    fn goes_on_down(&self, from: &JointVector) -> Steps<Result<(), String>> {
+        let base_from_tcp = self.robot.geometry().forward(from);
+        if let Err(why) = self.free_line(from, &above(&base_from_tcp, -SOFT_WAY_M))? {
+            return Ok(Err(why));
+        }
+        // A contact is lower than expected if the surface is; the parts beside the place are then lower, too.
+        let without_parts = Surroundings { lying: &[], ..self.surroundings() };
+        let lowest = above(&base_from_tcp, -(SOFT_WAY_M + BELOW_M));
+        Ok(self.free_line_among(&without_parts, from, &lowest)?.map(|_| ()))
     }
 
     fn go_above_place(&mut self, carried: Carried) -> Steps<()> {

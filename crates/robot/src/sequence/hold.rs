@@ -13,6 +13,7 @@ use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDT
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
+use crate::surroundings::Surroundings;
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
@@ -84,12 +85,22 @@ impl<A: Arm> Sequence<'_, '_, A> {
         start: &JointVector,
         base_from_tcp: &Isometry3<f64>,
     ) -> Steps<Result<JointPath, String>> {
+        self.free_line_among(&self.surroundings(), start, base_from_tcp)
+    }
+
+    /// As [`Self::free_line`], with some of the surroundings left out.
+    pub(super) fn free_line_among(
+        &self,
+        surroundings: &Surroundings<'_>,
+        start: &JointVector,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> Steps<Result<JointPath, String>> {
         let arm = self.robot.geometry();
         if !self.is_surrounded() {
             let line = arm.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
-        let model = self.surroundings().contact_model(self.robot.geometry(), self.robot.limits().table_height_m)?;
+        let model = surroundings.contact_model(arm, self.robot.limits().table_height_m)?;
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
         let line = checked_line(arm, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;

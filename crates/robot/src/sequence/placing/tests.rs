@@ -447,6 +447,19 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
 }
 
 #[test]
+fn a_descent_that_the_parts_beside_the_place_block_is_said_before_it_begins() {
+    // The hand's body is 29 mm above the tcp; at the contact it would be below the tops of the neighbouring parts.
+    let tall = PartShape::new(bar().outline().to_vec(), 0.020, 0.060, 0.030).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.03;
+    let known = GraspConfig { part: Some(tall), ..config() };
+    let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the straight path can be followed: the hand is") && why.contains("part "), "{why}");
+    assert!(report.touched.is_empty());
+}
+
+#[test]
 fn a_part_is_put_between_parts_that_lie_and_not_onto_one() {
     let goal = tray().goal(1).unwrap();
     let part = |goal: &PlaceGoal| LyingPart { base_from_part: goal.base_from_part(0.02, 0.0), shape: bar() };
