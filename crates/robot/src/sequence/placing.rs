@@ -12,7 +12,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
 
-use super::carry::{Aim, BELOW_M, SOFT_WAY_M};
+use super::carry::{Aim, BELOW_M};
 use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
 use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop};
@@ -228,7 +228,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Descends compliantly until contact with the place.
     fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
-        let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
+        let touch_down = TouchDown { max_way_m: aim.soft_m + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
             let why =
                 "this arm is not compliant, so it cannot put a part down by contact; the part is still held".to_owned();
@@ -239,7 +239,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         if touched.is_contact {
             return Ok(());
         }
-        let below_mm = (aim.base_from_tcp.translation.z - SOFT_WAY_M - touched.tcp_height_m) * 1e3;
+        let below_mm = (aim.base_from_tcp.translation.z - aim.soft_m - touched.tcp_height_m) * 1e3;
         let why = format!("no contact was measured down to {below_mm:.0} mm below the place; the part is still held");
         Err(Stop::Failed(GraspStep::PutDown, why))
     }

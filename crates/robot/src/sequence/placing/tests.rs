@@ -382,6 +382,30 @@ fn in_a_bin_a_part_lies_anyhow() {
 }
 
 #[test]
+fn in_a_bin_the_soft_descent_begins_above_the_part_that_lies_there() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let other = LyingPart { base_from_part: bin.base_from_part(0.02, 0.0), shape: bar() };
+    let known = GraspConfig { part: Some(bar()), lying: vec![other.clone()], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    let report = run(&mut cell, &known, &bin, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    let before = cell.arm.actions().iter().take_while(|action| !matches!(action, PlannedAction::Down { .. }));
+    let heights_m = before.filter_map(|action| match action {
+        PlannedAction::Motion(motion) => Some(ArmGeometry::panda().forward(motion.end()).translation.z),
+        _ => None,
+    });
+    // The grasp is 20 mm above the part's bottom, the other part is 30 mm high.
+    let bottom_m = heights_m.last().unwrap() - 0.020;
+    assert!((bottom_m - 0.045).abs() < 1e-4, "{bottom_m}");
+    // A bin that is full to 200 mm is refused.
+    let full = PartShape::new(bar().outline().to_vec(), 0.020, 0.200, 0.020).unwrap();
+    let known = GraspConfig { lying: vec![LyingPart { shape: full, ..other }], ..known };
+    let report = run(&mut super::tests::cell(Isometry3::identity()), &known, &bin, &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("may be filled to 200 mm, at most 175 mm are possible"), "{why}");
+}
+
+#[test]
 fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let wall = Obstacle {
         name: "wall".to_owned(),
