@@ -38,6 +38,11 @@ impl LyingPart {
         self.shape.outline_in_base(&self.base_from_part)
     }
 
+    /// z of the part's top, base frame, m.
+    pub(crate) fn top_in_base_m(&self) -> f64 {
+        self.base_from_part.translation.z + self.shape.top_m() - self.shape.grasp_height_m()
+    }
+
     /// Whether the two parts overlap as seen from above.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         gap_m(&self.outline_in_base(), &other.outline_in_base()) < 0.0

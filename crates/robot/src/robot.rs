@@ -125,6 +125,16 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
+    /// As [`Self::plan_along`], for a motion that satisfies all limits.
+    ///
+    /// # Errors
+    /// In addition [`RobotError::Unsafe`].
+    pub(crate) fn plan_safely_along(&mut self, path: &JointPath, cartesian: &CartesianLimits) -> Result<Trajectory> {
+        let motion = self.plan_along(path, cartesian)?;
+        self.limits_from(motion.start()).check(motion.clone())?;
+        Ok(motion)
+    }
+
     /// Plans with decreasing speeds and returns the first motion within the speed limits; if there is none, the
     /// slowest.
     ///

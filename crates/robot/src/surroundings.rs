@@ -1,6 +1,6 @@
 //! Motions around the obstacles of the cell.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use sdg_kinematics::collision::{Body, Capsule, CollisionError, CollisionModel, Obstacle, Shape};
 use sdg_kinematics::planning::{Plan, PlanError, PlanOptions, StraightApproach};
 use sdg_kinematics::{ArmGeometry, JointLimits, JointPath, JointVector, NUM_JOINTS, Trajectory};
@@ -21,6 +21,11 @@ const MAX_CHECKS: usize = 50_000;
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
+/// The obstacle under a surface contains the point this far below the surface, m.
+const BELOW_SUPPORT_M: f64 = 0.001;
+/// The obstacle under a surface does not contain the point this far above the surface, m: a solid around the surface is
+/// no support, and files describe obstacles with some margin.
+const ABOVE_SUPPORT_M: f64 = 0.003;
 
 /// Collision model of the arm with its fingers at an opening (m), the table and the obstacles.
 pub(crate) fn collision_model(
@@ -63,6 +68,9 @@ pub struct Surroundings<'a> {
     pub held: &'a [Capsule],
     /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
+    /// Point on the surface under the grasp or the place, base frame, m. On straight paths the hand may touch the
+    /// obstacle with this surface, as it may touch the table.
+    pub support: Option<Point3<f64>>,
     /// Minimum height above the table during the motion, m; less if start or destination is lower.
     pub table_clearance_m: f64,
 }
@@ -101,9 +109,9 @@ impl Surroundings<'_> {
         Ok(model)
     }
 
-    /// The collision model of straight paths: the hand may touch the table, and the held part may touch every obstacle,
-    /// because the part's shape is known less exactly than that of the fingers, and because its room in a tray was
-    /// checked before.
+    /// The collision model of straight paths: the hand may touch the table and the obstacle under the grasp or the
+    /// place. The held part may touch every obstacle, because the part's shape is known less exactly than that of the
+    /// fingers, and because its room in a tray was checked before.
     pub(crate) fn contact_model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
         let opening_m = self.opening_m.clamp(0.0, arm.hand.opening_max_m);
@@ -111,10 +119,23 @@ impl Surroundings<'_> {
         let names: Vec<String> = model.obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
         let device = |error: CollisionError| RobotError::Device(Box::new(error));
         model.allow(Body::HAND, TABLE).map_err(device)?;
+        for support in self.obstacles.iter().filter(|obstacle| self.is_support(obstacle)) {
+            model.allow(Body::HAND, &support.name).map_err(device)?;
+        }
         for name in names {
             model.allow(Body::HELD_PART, &name).map_err(device)?;
         }
         Ok(model)
+    }
+
+    /// Whether the surface under the grasp or the place is that of an obstacle.
+    fn is_support(&self, obstacle: &Obstacle) -> bool {
+        let Some(support) = self.support else { return false };
+        let distance_m = |up_m: f64| {
+            let p = Point3::new(support.x, support.y, support.z + up_m);
+            obstacle.shape.signed_distance_m(&(obstacle.base_from_obstacle.inverse() * p))
+        };
+        distance_m(-BELOW_SUPPORT_M) <= 0.0 && distance_m(ABOVE_SUPPORT_M) > 0.0
     }
 
     /// Height of the table for a free motion: raised by the clearance, as far as both ends allow it.

@@ -68,6 +68,9 @@ impl Default for TouchDown {
 }
 
 impl TouchDown {
+    /// Maximum length of a descent, m.
+    pub(crate) const MAX_WAY_M: f64 = 0.2;
+
     /// Checks every setting.
     ///
     /// # Errors
@@ -75,12 +78,11 @@ impl TouchDown {
     pub(crate) fn validate(&self) -> Result<()> {
         /// Maximum speed: at higher speeds a contact is an impact.
         const MAX_SPEED_M_S: f64 = 0.05;
-        const MAX_WAY_M: f64 = 0.2;
         /// Maximum uncertainty of the table's height; the check against the table is weaker by this distance.
         const MAX_BELOW_TABLE_M: f64 = 0.05;
         const MAX_FORCE_N: f64 = 15.0;
         check_positive("speed of the descent in m/s", self.speed_m_s, MAX_SPEED_M_S)?;
-        check_positive("length of the descent in m", self.max_way_m, MAX_WAY_M)?;
+        check_positive("length of the descent in m", self.max_way_m, Self::MAX_WAY_M)?;
         check_not_negative("distance below the table in m", self.below_table_m, MAX_BELOW_TABLE_M)?;
         check_positive("force of a contact in N", self.contact_n, MAX_FORCE_N)?;
         check_positive("force of pressing in N", self.press_n, MAX_FORCE_N)?;

@@ -43,6 +43,7 @@ fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
         lying: &[],
         held: &[],
         opening_m: HAND_OPENING_MAX_M,
+        support: None,
         table_clearance_m: FREE_CLEARANCE_M,
     };
     let goal = [beside_the_wall(y)];

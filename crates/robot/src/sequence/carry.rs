@@ -1,24 +1,27 @@
 //! Carries the held part to above its place, in an orientation in which the fingers have room and the compliant descent
 //! is possible.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use sdg_geometry::RotationalSymmetry;
 use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
 
+use super::held_part::HeldPart;
 use super::reach::above;
 use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::ContactSensitivity;
+use crate::lying_part::LyingPart;
 use crate::perception::GraspStep;
 use crate::place::PlaceGoal;
 use crate::room::same_turns_rad;
-use crate::surroundings::{Destination, Way};
+use crate::surroundings::{Destination, Surroundings, Way};
+use crate::touch::TouchDown;
 
 /// Heights above a place at which a straight descent to it starts, m.
 const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
-/// Height above the expected contact at which the compliant descent starts, m.
-pub(super) const SOFT_WAY_M: f64 = 0.015;
-/// Distance below the expected contact at which the compliant descent ends, m.
+/// Height above the highest expected contact at which the compliant descent starts, m.
+const SOFT_WAY_M: f64 = 0.015;
+/// Distance below the lowest expected contact at which the compliant descent ends, m.
 pub(super) const BELOW_M: f64 = 0.010;
 
 /// The pose of the part at its place, and the pose of the tcp before the compliant descent.
@@ -26,6 +29,8 @@ pub(super) const BELOW_M: f64 = 0.010;
 pub(super) struct Aim {
     pub(super) base_from_part: Isometry3<f64>,
     pub(super) base_from_tcp: Isometry3<f64>,
+    /// Height of the tcp before the compliant descent above that at the lowest expected contact, m.
+    pub(super) soft_m: f64,
 }
 
 /// The path of the held part to above its place.
@@ -49,12 +54,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.known.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         // The hand opens at the place; the straight path is therefore planned for the open hand.
         self.known.opening_m = opening_m;
+        let [x, y] = goal.at_m;
+        self.known.support = Some(Point3::new(x, y, goal.surface_m));
+        let soft_m = self.soft_way_m(goal, &held)?;
         let mut aims: Vec<Aim> = same_turns_rad(symmetry)
             .into_iter()
             .map(|turn_rad| {
                 let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
-                let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
-                Aim { base_from_part, base_from_tcp }
+                let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), soft_m);
+                Aim { base_from_part, base_from_tcp, soft_m }
             })
             .collect();
         if let Some(part) = &held.shape {
@@ -81,9 +89,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     Carried::Around(way) => way.approach.as_ref().map(|path| *path.end()),
                     Carried::Straight(approach) => Some(*approach.path.end()),
                 };
-                // A joint limit may end the descent before the contact in one orientation of the part and not in
-                // another.
-                if let Err(because) = end.map_or(Ok(()), |end| self.goes_on_down(&end)) {
+                // A joint limit or an obstacle may end the descent before the contact in one orientation of the part
+                // and not in another.
+                if let Some(end) = end
+                    && let Err(because) = self.goes_on_down(&end, soft_m)?
+                {
                     why.get_or_insert(because);
                     continue;
                 }
@@ -91,7 +101,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 return Ok(aim);
             }
         }
-        let [x, y] = goal.at_m;
         let why = why.unwrap_or_default();
         Err(Stop::Failed(GraspStep::Carry, format!("no path to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
     }
@@ -130,13 +139,35 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(best.ok_or(why))
     }
 
+    /// Height above the lowest expected contact at which the compliant descent starts, m. In a bin the part may be put
+    /// on other parts: on the known ones, and at least on one like itself, because not every part there is known.
+    fn soft_way_m(&self, goal: &PlaceGoal, held: &HeldPart) -> Steps<f64> {
+        let (Some(_), Some(shape)) = (goal.bin_m, &held.shape) else { return Ok(SOFT_WAY_M) };
+        let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, 0.0);
+        let placed = LyingPart { base_from_part, shape: shape.clone() };
+        let below = self.known.lying.all().iter().filter(|other| other.overlaps(&placed));
+        let filled_m = below.map(|other| other.top_in_base_m() - goal.surface_m).fold(shape.top_m(), f64::max);
+        let max_m = TouchDown::MAX_WAY_M - SOFT_WAY_M - BELOW_M;
+        if filled_m <= max_m {
+            return Ok(SOFT_WAY_M + filled_m);
+        }
+        let (name, filled_mm, max_mm) = (&goal.name, filled_m * 1e3, max_m * 1e3);
+        let why = format!("\"{name}\" may be filled to {filled_mm:.0} mm, at most {max_mm:.0} mm are possible");
+        Err(Stop::Failed(GraspStep::Carry, why))
+    }
+
     /// Checks that the arm can descend from a configuration to the lowest possible contact; otherwise returns the
     /// reason.
-    fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
-        let arm = self.robot.geometry();
-        let lowest = above(&arm.forward(from), -(SOFT_WAY_M + BELOW_M));
-        let line = arm.straight_path(from, &lowest, &LineOptions::default());
-        line.map(|_| ()).map_err(|error| error.to_string())
+    fn goes_on_down(&self, from: &JointVector, soft_m: f64) -> Steps<Result<(), String>> {
+        let base_from_tcp = self.robot.geometry().forward(from);
+        if let Err(why) = self.free_line(from, &above(&base_from_tcp, -SOFT_WAY_M))? {
+            return Ok(Err(why));
+        }
+        // A contact is lower than expected if the surface is; the parts beside the place are then lower, too. In a bin,
+        // it is lower than the parts only if they do not lie where they are assumed.
+        let without_parts = Surroundings { lying: &[], ..self.surroundings() };
+        let lowest = above(&base_from_tcp, -(soft_m + BELOW_M));
+        Ok(self.free_line_among(&without_parts, from, &lowest)?.map(|_| ()))
     }
 
     fn go_above_place(&mut self, carried: Carried) -> Steps<()> {

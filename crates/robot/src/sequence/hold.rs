@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use sdg_kinematics::collision::Checker;
 use sdg_kinematics::planning::{CheckedLine, checked_line};
-use sdg_kinematics::{JointPath, JointVector, LineOptions};
+use sdg_kinematics::{CartesianLimits, JointPath, JointVector, LineOptions, Trajectory};
 
 use super::held_part::HeldPart;
 use super::reach::above;
@@ -13,11 +13,12 @@ use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDT
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
+use crate::surroundings::Surroundings;
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
-/// Steps by which a lift is shortened if the arm cannot reach the end of the lift, m.
-const LIFT_STEP_M: f64 = 0.05;
+/// Steps by which a straight motion up is shortened if the arm cannot follow the whole motion, m.
+const UP_STEP_M: f64 = 0.05;
 /// Minimum distance from the obstacles of the cell on straight motions, m.
 const LINE_MARGIN_M: f64 = 0.003;
 
@@ -44,25 +45,38 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach that height.
+    /// Lifts the part by [`super::GraspConfig::lift_m`], or less if the arm cannot reach that height or may not move
+    /// there.
     pub(super) fn lift(&mut self) -> Steps<()> {
         self.begin(GraspStep::Lift)?;
-        let start = self.robot.commanded()?;
-        let base_from_tcp = self.robot.geometry().forward(&start);
-        let mut lift_m = self.cell.config.lift_m;
-        let path = loop {
-            let lifted = above(&base_from_tcp, lift_m);
-            match self.free_line(&start, &lifted)? {
-                Ok(path) => break path,
-                Err(_) if lift_m - LIFT_STEP_M >= self.cell.config.min_lift_m - 1e-9 => lift_m -= LIFT_STEP_M,
-                Err(why) => return Err(Stop::Failed(GraspStep::Lift, why)),
-            }
-        };
-        let planned = self.robot.plan_along(&path, &self.cell.config.pace.lift_limits(self.robot.geometry()));
-        let motion = fails_at(GraspStep::Lift, planned)?;
+        let config = self.cell.config;
+        let limits = config.pace.lift_limits(self.robot.geometry());
+        let motion = self.plan_up([config.min_lift_m, config.lift_m], &limits, GraspStep::Lift)?;
         self.follow(motion, GraspStep::Lift)?;
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Lift, &hand)
+    }
+
+    /// The longest straight motion up, between two lengths (m), that is free of obstacles and satisfies the limits.
+    pub(super) fn plan_up(
+        &mut self,
+        [min_m, max_m]: [f64; 2],
+        limits: &CartesianLimits,
+        step: GraspStep,
+    ) -> Steps<Trajectory> {
+        let start = self.robot.commanded()?;
+        let base_from_tcp = self.robot.geometry().forward(&start);
+        let mut up_m = max_m;
+        loop {
+            let planned = match self.free_line(&start, &above(&base_from_tcp, up_m))? {
+                Ok(path) => fails_at(step, self.robot.plan_safely_along(&path, limits)),
+                Err(why) => Err(Stop::Failed(step, why)),
+            };
+            match planned {
+                Err(Stop::Failed(..)) if up_m - UP_STEP_M >= min_m - 1e-9 => up_m -= UP_STEP_M,
+                planned => return planned,
+            }
+        }
     }
 
     /// A straight motion free of obstacles; otherwise the reason why there is none.
@@ -71,12 +85,22 @@ impl<A: Arm> Sequence<'_, '_, A> {
         start: &JointVector,
         base_from_tcp: &Isometry3<f64>,
     ) -> Steps<Result<JointPath, String>> {
+        self.free_line_among(&self.surroundings(), start, base_from_tcp)
+    }
+
+    /// As [`Self::free_line`], with some of the surroundings left out.
+    pub(super) fn free_line_among(
+        &self,
+        surroundings: &Surroundings<'_>,
+        start: &JointVector,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> Steps<Result<JointPath, String>> {
         let arm = self.robot.geometry();
         if !self.is_surrounded() {
             let line = arm.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
-        let model = self.surroundings().contact_model(self.robot.geometry(), self.robot.limits().table_height_m)?;
+        let model = surroundings.contact_model(arm, self.robot.limits().table_height_m)?;
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
         let line = checked_line(arm, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;

@@ -110,11 +110,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Fails if the picture on which the next motion depends is too old.
+    /// Fails if the picture on which the next motion depends is too old, for this motion and for every later one that
+    /// depends on the same picture.
     pub(super) fn check_age(&mut self) -> Steps<()> {
-        let Some(taken) = self.known.picture_time.take() else { return Ok(()) };
+        let Some(taken) = self.known.picture_time else { return Ok(()) };
         let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.cell.config.max_detection_age_secs);
         if age_secs <= max_secs {
+            self.known.picture_time = None;
             return Ok(());
         }
         Err(Stop::Failed(

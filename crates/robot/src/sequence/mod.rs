@@ -26,6 +26,7 @@ mod travel;
 
 use std::time::Instant;
 
+use nalgebra::Point3;
 use sdg_kinematics::Trajectory;
 
 use crate::arm::{Arm, CompliantArm};
@@ -175,6 +176,8 @@ struct Known {
     held: Option<HeldPart>,
     /// z of the surface under the part, from the measured or given height of the part, m.
     surface_m: Option<f64>,
+    /// Point on the surface under the present grasp or place, base frame, m.
+    support: Option<Point3<f64>>,
     /// Lying parts that must not be touched.
     lying: LyingParts,
     /// The present opening of the hand, or that of the next straight path, m.
@@ -218,6 +221,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             closed: None,
             held: None,
             surface_m: config.surface_m,
+            support: None,
             lying: LyingParts::new(&config.lying),
             opening_m: robot.geometry().hand.opening_max_m,
             opening_margin_m: config.opening_margin_m,
@@ -273,6 +277,8 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
     /// Moves above a found part, grasps it, lifts it and holds it.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
+        let p = target.base_from_tcp.translation;
+        self.known.support = Some(Point3::new(p.x, p.y, self.surface_height_m()));
         let approach = self.go_above(target)?;
         self.descend(approach)?;
         self.close(target)?;

@@ -11,13 +11,11 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
-use sdg_kinematics::{JointPath, JointVector};
 
-use super::carry::{Aim, BELOW_M, SOFT_WAY_M};
+use super::carry::{Aim, BELOW_M};
 use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
-use super::reach::above;
-use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
+use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
 use crate::camera_pose::CameraPose;
@@ -34,8 +32,8 @@ use crate::touch::{TouchDown, Touched};
 const RELEASING_SPEED_M_S: f64 = 0.05;
 /// Time that the arm stands still after the fingers have opened, s.
 const RELEASED_SECS: f64 = 0.2;
-/// Steps by which the ascent is shortened if the arm cannot reach the end of the ascent, m.
-const RETREAT_STEP_M: f64 = 0.05;
+/// The smallest sufficient ascent after the release if the arm cannot follow the whole ascent, m.
+const MIN_RETREAT_M: f64 = 0.05;
 
 /// Settings for putting a held part down.
 #[derive(Debug, Clone, PartialEq)]
@@ -230,7 +228,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Descends compliantly until contact with the place.
     fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
-        let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
+        let touch_down = TouchDown { max_way_m: aim.soft_m + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
             let why =
                 "this arm is not compliant, so it cannot put a part down by contact; the part is still held".to_owned();
@@ -241,7 +239,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         if touched.is_contact {
             return Ok(());
         }
-        let below_mm = (aim.base_from_tcp.translation.z - SOFT_WAY_M - touched.tcp_height_m) * 1e3;
+        let below_mm = (aim.base_from_tcp.translation.z - aim.soft_m - touched.tcp_height_m) * 1e3;
         let why = format!("no contact was measured down to {below_mm:.0} mm below the place; the part is still held");
         Err(Stop::Failed(GraspStep::PutDown, why))
     }
@@ -259,10 +257,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         self.robot.wait(RELEASED_SECS)?;
         self.passed(GraspStep::Release)?;
-        let start = self.robot.commanded()?;
-        let path = self.way_up(&start, placing.retreat_m)?;
-        let planned = self.robot.plan_along(&path, &self.cell.config.pace.approach_limits(self.robot.geometry()));
-        let motion = fails_at(GraspStep::Release, planned)?;
+        let limits = self.cell.config.pace.approach_limits(self.robot.geometry());
+        let motion = self.plan_up([MIN_RETREAT_M, placing.retreat_m], &limits, GraspStep::Release)?;
         self.follow(motion, GraspStep::Release)?;
         Ok(part_from_tcp)
     }
@@ -271,18 +267,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
         let width_m = self.known.closed.map_or(0.0, |hand| hand.opening_m);
         release_opening_m(width_m, placing.release_margin_m, &self.robot.geometry().hand)
-    }
-
-    fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
-        let base_from_tcp = self.robot.geometry().forward(start);
-        let mut up_m = retreat_m;
-        loop {
-            match self.free_line(start, &above(&base_from_tcp, up_m))? {
-                Ok(path) => return Ok(path),
-                Err(_) if up_m > RETREAT_STEP_M + 1e-9 => up_m -= RETREAT_STEP_M,
-                Err(why) => return Err(Stop::Failed(GraspStep::Release, why)),
-            }
-        }
     }
 
     /// Measures with a picture where the part lies.
@@ -302,6 +286,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             .collect();
         self.known.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
+        let max_offset_m = max_offset_m(goal);
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
             let arrived = match (&self.cell.camera, self.cell.config.look_outs.first()) {
                 (CameraPose::OnFlange(_), _) => self.hover(&grasps, shift_m, GraspStep::Check),
@@ -321,7 +306,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
                 None => {
                     let apart = found.base_from_tcp.translation.vector - base_from_part.translation.vector;
-                    apart.xy().norm() <= MAX_PLACE_OFFSET_M
+                    apart.xy().norm() <= max_offset_m
                 }
             };
             if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
@@ -338,6 +323,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
 const MAX_VIEW_TURNS: usize = 4;
 /// Largest distance of the part from its place, m; a detection farther away is another part.
 const MAX_PLACE_OFFSET_M: f64 = 0.03;
+
+/// Largest distance of a detection from its place, m: in a tray, a part that is nearer to another cell is that cell's.
+fn max_offset_m(goal: &PlaceGoal) -> f64 {
+    let half_pitches_m = goal.tray.iter().flat_map(|tray| tray.pitch_m.map(|pitch_m| 0.5 * pitch_m));
+    half_pitches_m.fold(MAX_PLACE_OFFSET_M, f64::min)
+}
 
 fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Check, why)

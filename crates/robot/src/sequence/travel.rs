@@ -3,12 +3,10 @@
 use sdg_kinematics::{JointLimits, JointPath, JointVector};
 
 use super::config::GraspConfig;
-use super::held_part::HeldPart;
-use super::{FREE_CLEARANCE_M, Sequence, Steps, Stop, fails_at};
+use super::{FREE_CLEARANCE_M, Known, Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::ContactSensitivity;
 use crate::error::Result;
-use crate::lying_part::LyingParts;
 use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Surroundings, Way};
 
@@ -20,13 +18,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// The obstacles and parts around the arm, and the held part.
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m)
+        around(self.cell.config, &self.known)
     }
 
     /// A path around the obstacles and parts of the cell.
     pub(super) fn way_to(&mut self, to: &Destination<'_>) -> Result<Way> {
         let limits = self.free_limits();
-        let surroundings = around(self.cell.config, &self.known.lying, self.known.held.as_ref(), self.known.opening_m);
+        let surroundings = around(self.cell.config, &self.known);
         self.robot.plan_around(&surroundings, to, &limits)
     }
 
@@ -75,17 +73,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
 }
 
 /// The obstacles and parts around an arm, and the held part.
-fn around<'s>(
-    config: &'s GraspConfig,
-    lying: &'s LyingParts,
-    held: Option<&'s HeldPart>,
-    opening_m: f64,
-) -> Surroundings<'s> {
+fn around<'s>(config: &'s GraspConfig, known: &'s Known) -> Surroundings<'s> {
     Surroundings {
         obstacles: &config.obstacles,
-        lying: lying.all(),
-        held: held.map_or(&[], |held| &held.in_tcp),
-        opening_m,
+        lying: known.lying.all(),
+        held: known.held.as_ref().map_or(&[], |held| &held.in_tcp),
+        opening_m: known.opening_m,
+        support: known.support,
         table_clearance_m: FREE_CLEARANCE_M,
     }
 }

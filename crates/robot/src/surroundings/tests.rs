@@ -21,7 +21,7 @@ fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Re
     let mut arm = PlannedArm::new(ArmGeometry::panda(), *start, 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let joints = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();
-    let surroundings = Surroundings { obstacles, lying: &[], held: &[], opening_m: 0.08, table_clearance_m: 0.05 };
+    let surroundings = Surroundings { obstacles, opening_m: 0.08, table_clearance_m: 0.05, ..Default::default() };
     robot.plan_around(&surroundings, to, &joints)
 }
 
@@ -77,6 +77,24 @@ fn a_hand_that_begins_near_the_table_may_leave_it() {
     let start = ArmGeometry::panda().inverse(&down(0.45, 0.2, 0.012), &ready_pose(), &Default::default()).unwrap().q;
     let way = plan(&[], &start, &Destination::Configuration(&ready_pose())).unwrap();
     assert!((way.motions.last().unwrap().end() - ready_pose()).amax() < 1e-9);
+}
+
+#[test]
+fn fingers_may_touch_only_the_obstacle_under_the_grasp() {
+    let panda = ArmGeometry::panda();
+    let q = panda.inverse(&down(0.45, 0.2, 0.038), &ready_pose(), &Default::default()).unwrap().q;
+    let is_free = |height_m: f64, support: Option<Point3<f64>>| {
+        let obstacles = [wall("box", [0.1, 0.1, 0.5 * height_m], [0.45, 0.2, 0.5 * height_m])];
+        let surroundings = Surroundings { obstacles: &obstacles, opening_m: 0.08, support, ..Default::default() };
+        let model = surroundings.contact_model(&panda, 0.0).unwrap();
+        let mut checker = Checker::new(&model, 0.003);
+        checker.is_free(&q)
+    };
+    let support = Some(Point3::new(0.45, 0.2, 0.030));
+    assert!(is_free(0.030, support));
+    assert!(!is_free(0.030, None));
+    // The surface is inside the box, not on it.
+    assert!(!is_free(0.040, support));
 }
 
 fn bar_at(x: f64, y: f64) -> LyingPart {

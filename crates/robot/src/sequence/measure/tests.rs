@@ -1,5 +1,7 @@
 //! The sequence with an arm that does not move and a part that is visible in some pictures only.
 
+use std::time::{Duration, Instant};
+
 use nalgebra::UnitQuaternion;
 use sdg_kinematics::{ArmGeometry, ready_pose};
 
@@ -144,6 +146,34 @@ fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradict
     assert!(why.starts_with("expected marks at the given height of 30.0 ± 1.0 mm, measured 36.0"), "{why}");
     let (report, ..) = grasped(&config(told(0.0355)), &[], true);
     assert_eq!(report.height.unwrap().settled.unwrap().source, HeightSource::Measured);
+}
+
+/// Finds the part; the picture from above it is a minute old.
+struct Late {
+    num_pictures: usize,
+}
+
+impl PartFinder<PlannedArm> for Late {
+    fn find(&mut self, _arm: &mut PlannedArm) -> crate::Result<Option<GraspTarget>> {
+        self.num_pictures += 1;
+        Ok(Some(part(0.020)))
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        if self.num_pictures < 2 { None } else { Instant::now().checked_sub(Duration::from_secs(60)) }
+    }
+}
+
+#[test]
+fn an_old_picture_starts_no_motion_to_any_position_beside_the_part() {
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let report = grasp(&mut robot, &mut Late { num_pictures: 0 }, &mut (), camera(), &config(None)).unwrap();
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the detection is "), "{why}");
+    // Only the motions to the look-out pose and to above the part.
+    let is_motion = |action: &&PlannedAction| matches!(action, PlannedAction::Motion(_));
+    assert_eq!(arm.actions().iter().filter(is_motion).count(), 2);
 }
 
 #[test]

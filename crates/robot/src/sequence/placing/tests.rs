@@ -5,7 +5,7 @@ use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};
 use crate::planned_arm::{PlannedAction, PlannedArm};
-use crate::safety::{CheckedMotion, SafetyLimits};
+use crate::safety::{CheckedMotion, SafetyLimits, WorkspaceBox};
 use crate::sequence::{LookOut, grasp};
 use crate::watch::{StopReason, Watch};
 use sdg_kinematics::collision::{Obstacle, Shape};
@@ -156,6 +156,23 @@ fn a_part_lies_where_it_was_to_lie() {
     }
 }
 
+#[test]
+fn a_lift_is_shortened_until_it_stays_in_the_workspace() {
+    let above = Isometry3::translation(0.0, 0.0, 0.3) * lying(0.45, -0.1, 0.0);
+    let low = ArmGeometry::panda().inverse(&above, &ready_pose(), &Default::default()).unwrap().q;
+    let workspace = WorkspaceBox { min_m: Vector3::repeat(-1.0), max_m: Vector3::new(1.0, 1.0, 0.5) };
+    let limits = SafetyLimits { workspace: Some(workspace), ..SafetyLimits::default() };
+    let config = GraspConfig { look_outs: vec![LookOut::Joints(low)], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    cell.arm = PlannedArm::new(ArmGeometry::panda(), low, 0.08);
+    let mut robot = Robot::new(&mut cell, limits, Watch::default());
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let report = grasp(&mut robot, &mut Truth, &mut (), camera, &config).unwrap();
+    assert_eq!(report.outcome, GraspOutcome::Held);
+    // Instead of 0.45 m above the grasp: the flange is 0.10 m higher than the tcp.
+    assert!((cell.tcp().translation.z - 0.37).abs() < 1e-4, "{}", cell.tcp());
+}
+
 /// Finds nothing; a person presses the stop button during the first picture.
 struct Stopped;
 
@@ -201,6 +218,35 @@ fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.starts_with("the detection is "), "{why}");
     assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
+}
+
+/// Finds the part, but after it was put down, the part at this pose.
+struct Neighbour(Isometry3<f64>);
+
+impl PartFinder<Cell> for Neighbour {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, _cell: &mut Cell, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        Ok(Some(GraspTarget { base_from_tcp: self.0, jaw_width_m: 0.02, score: 0.9 }))
+    }
+}
+
+#[test]
+fn a_part_in_the_next_cell_of_a_narrow_tray_is_not_the_one_put_down() {
+    let kind = PlaceKind::Tray { cells: [2, 2], pitch_m: [0.028, 0.08] };
+    let [goal, next] = [1, 2].map(|number| Place { kind, ..tray() }.goal(number).unwrap());
+    let mut finder = Neighbour(next.base_from_part(0.02, 0.0));
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let (camera, config) = (CameraPose::InBase(Isometry3::identity()), config());
+    let report =
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &config, &goal, &PlacingConfig::default()).unwrap();
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part is not seen where it was put down"), "{why}");
+    let is_grasp = |action: &&PlannedAction| matches!(action, PlannedAction::Hand(HandCommand::Grasp { .. }));
+    assert_eq!(cell.arm.actions().iter().filter(is_grasp).count(), 1);
 }
 
 /// Records the steps that begin.
@@ -252,6 +298,26 @@ fn a_part_that_slides_is_taken_again_from_a_raised_place() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 2);
     assert!((cell.base_from_part.translation.z - 0.05).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
+fn a_low_part_is_put_onto_an_obstacle_and_taken_from_it() {
+    let shelf = Obstacle {
+        name: "shelf".to_owned(),
+        shape: Shape::Box { half_m: [0.1, 0.1, 0.015] },
+        base_from_obstacle: Isometry3::translation(0.4, -0.3, 0.015),
+    };
+    let place =
+        |at_m: [f64; 2], surface_m: f64| Place { at_m, surface_m, kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.008;
+    let onto = GraspConfig { obstacles: vec![shelf], ..config() };
+    let report = run(&mut cell, &onto, &place([0.4, -0.3], 0.03), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.038).abs() < 1e-4, "{}", cell.base_from_part);
+    let from = GraspConfig { surface_m: Some(0.03), ..onto };
+    let report = run(&mut cell, &from, &place([0.5, 0.1], 0.0), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
 }
 
 #[test]
@@ -317,6 +383,30 @@ fn in_a_bin_a_part_lies_anyhow() {
 }
 
 #[test]
+fn in_a_bin_the_soft_descent_begins_above_the_part_that_lies_there() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let other = LyingPart { base_from_part: bin.base_from_part(0.02, 0.0), shape: bar() };
+    let known = GraspConfig { part: Some(bar()), lying: vec![other.clone()], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    let report = run(&mut cell, &known, &bin, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    let before = cell.arm.actions().iter().take_while(|action| !matches!(action, PlannedAction::Down { .. }));
+    let heights_m = before.filter_map(|action| match action {
+        PlannedAction::Motion(motion) => Some(ArmGeometry::panda().forward(motion.end()).translation.z),
+        _ => None,
+    });
+    // The grasp is 20 mm above the part's bottom, the other part is 30 mm high.
+    let bottom_m = heights_m.last().unwrap() - 0.020;
+    assert!((bottom_m - 0.045).abs() < 1e-4, "{bottom_m}");
+    // A bin that is full to 200 mm is refused.
+    let full = PartShape::new(bar().outline().to_vec(), 0.020, 0.200, 0.020).unwrap();
+    let known = GraspConfig { lying: vec![LyingPart { shape: full, ..other }], ..known };
+    let report = run(&mut super::tests::cell(Isometry3::identity()), &known, &bin, &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("may be filled to 200 mm, at most 175 mm are possible"), "{why}");
+}
+
+#[test]
 fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let wall = Obstacle {
         name: "wall".to_owned(),
@@ -379,6 +469,19 @@ fn a_tray_without_room_is_refused_before_anything_moves() {
     let PlacingOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");
     assert_eq!(cell.base_from_part, lying(0.5, 0.1, 0.4));
+}
+
+#[test]
+fn a_descent_that_the_parts_beside_the_place_block_is_said_before_it_begins() {
+    // The hand's body is 29 mm above the tcp; at the contact it would be below the tops of the neighbouring parts.
+    let tall = PartShape::new(bar().outline().to_vec(), 0.020, 0.060, 0.030).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.03;
+    let known = GraspConfig { part: Some(tall), ..config() };
+    let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the straight path can be followed: the hand is") && why.contains("part "), "{why}");
+    assert!(report.touched.is_empty());
 }
 
 #[test]
