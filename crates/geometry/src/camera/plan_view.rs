@@ -52,10 +52,10 @@ pub struct PlanView {
 pub enum PlanViewError {
     /// The camera does not look at the plane.
     #[error(
-        "expected the camera to look down at the plane {height_m} m above the table; the middle of its picture does not show it"
+        "expected the camera to look down at the plane at z = {height_m} m; the middle of its picture does not show it"
     )]
     NotInView {
-        /// The plane's height in the world.
+        /// The plane's z in the world, in metres.
         height_m: f64,
     },
     /// The picture shows nothing of the workspace.
@@ -233,7 +233,8 @@ mod tests {
         let of = |tilt_deg: f64, workspace: Option<&Workspace>, max| {
             PlanView::of(&camera(tilt_deg), 0.0, 1000.0, workspace, max)
         };
-        assert!(matches!(of(120.0, None, u64::MAX), Err(PlanViewError::NotInView { .. })));
+        let away = of(120.0, None, u64::MAX).unwrap_err();
+        assert!(matches!(away, PlanViewError::NotInView { .. }) && away.to_string().contains("at z = 0 m"), "{away}");
         assert!(matches!(of(0.0, None, 1000), Err(PlanViewError::TooLarge { max: 1000, .. })));
         let elsewhere = Workspace { x_m: [2.0, 3.0], y_m: [0.0, 1.0] };
         assert!(matches!(of(0.0, Some(&elsewhere), u64::MAX), Err(PlanViewError::OutsideWorkspace { .. })));
