@@ -58,16 +58,17 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
     }
-    let start = Instant::now();
+    let mut due = Instant::now();
     let mut num_written = 0;
     while num_written < args.count && !interrupt.is_requested() {
-        let due = start + Duration::from_secs_f64(args.every * f64::from(num_written));
         while Instant::now() < due && !interrupt.is_requested() {
             std::thread::sleep(due.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)));
         }
         let Some(frame) = next_frame(camera.as_mut())? else {
             break;
         };
+        // From this frame and not from the start: after a pause of the camera, missed frames are not made up for.
+        due = Instant::now() + Duration::from_secs_f64(args.every);
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
         sdg_files::write_png(&path, &frame.picture)?;
         print_frame(&path, &frame, args.json)?;
