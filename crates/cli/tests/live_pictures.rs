@@ -4,7 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::support::sdg;
+use crate::camera::WRIST_CAMERA;
+use crate::picture_kinds::with_orientation;
+use crate::support::{Folder, sdg};
 use image::{Rgb, RgbImage};
 use serde_json::Value;
 
@@ -98,6 +100,24 @@ fn frames_come_at_their_times_and_are_the_newest() {
     // In a pause, the time of the second and of the third frame passes; the third is still half a second later.
     let numbers = grabbed_every_half_second(1.3);
     assert!(numbers[2] >= numbers[1] + 2, "{numbers:?}");
+}
+
+#[test]
+fn frames_of_a_calibrated_camera_have_its_stored_pixels_and_its_size() {
+    let files = Folder::new();
+    let stored = RgbImage::from_fn(640, 480, |x, _| Rgb([if x < 320 { 50 } else { 200 }; 3]));
+    fs::write(files.path("photo.jpg"), with_orientation(&stored.into(), 3)).unwrap();
+    let (address, out) = (format!("file:{}", files.path("photo.jpg")), files.path("out.png"));
+    let grab = |further: &[&str]| sdg(&[&["camera", "grab", "--from", &address, "--out", &out], further].concat());
+    let level_of = |further: &[&str]| {
+        let output = grab(further);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        level(Path::new(&out))
+    };
+    let wrist = files.text("wrist.yaml", WRIST_CAMERA);
+    assert!(level_of(&[]).abs_diff(200) < 10 && level_of(&["--camera", &wrist]).abs_diff(50) < 10);
+    let wide = files.text("wide.yaml", &WRIST_CAMERA.replace("image_width: 640", "image_width: 1280"));
+    assert_refused(&grab(&["--camera", &wide]), 1, &["frame 0 of file:", "1280 × 480", "640 × 480"]);
 }
 
 #[test]
