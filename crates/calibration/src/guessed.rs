@@ -11,6 +11,8 @@ use crate::table::{focal_from_sheet, homography_rms_px};
 const MAX_FOCAL_SIGMA: f64 = 0.1;
 /// Assumed angle of view along the picture's longer side, in degrees: typical of webcams and phones.
 pub const ASSUMED_VIEW_DEG: f64 = 60.0;
+/// Name of a camera that was not calibrated.
+pub const UNCALIBRATED: &str = "uncalibrated";
 /// Largest reprojection error that a lens without distortion explains; a larger one is due to distortion.
 const MAX_STRAIGHT_PX: f64 = 1.0;
 
@@ -60,8 +62,7 @@ pub fn guess_camera(
     let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
     let intrinsics = PinholeCamera { width, height, fx: focal, fy: focal, cx, cy, lens: PlumbBob::NONE };
     let intrinsics = intrinsics.checked().ok()?;
-    let camera =
-        CalibratedCamera { name: "uncalibrated".to_owned(), intrinsics, table: None, flange_from_camera: None };
+    let camera = CalibratedCamera { name: UNCALIBRATED.to_owned(), intrinsics, table: None, flange_from_camera: None };
     Some((camera, source))
 }
 

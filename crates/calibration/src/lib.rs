@@ -57,7 +57,7 @@ pub use board_session::{BoardSession, BoardSight};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
 pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
-pub use guessed::{ASSUMED_VIEW_DEG, FocalSource, bent_px, guess_camera};
+pub use guessed::{ASSUMED_VIEW_DEG, FocalSource, UNCALIBRATED, bent_px, guess_camera};
 pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, RobotPose, calibrate_hand_eye, read_robot_poses};
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};

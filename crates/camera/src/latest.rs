@@ -10,8 +10,9 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// Maximum number of unread errors; the oldest ones are dropped.
-const MAX_ERRORS: usize = 16;
+/// Maximum number of unread errors; the oldest ones are dropped. It is below the 15 faults in a row that `sdg` skips, so
+/// that the faults of a time in which nobody reads do not end a command.
+const MAX_ERRORS: usize = 8;
 
 /// The newest frame of a camera that a thread reads; older frames are dropped and counted.
 ///
@@ -87,7 +88,7 @@ impl LatestFrame {
     /// the camera's end ([`has_ended`](Self::has_ended)).
     ///
     /// # Errors
-    /// Each error of the camera, once, before the frame. Of more than 16 unread errors, the oldest are lost.
+    /// Each error of the camera, once, before the frame. Of more than 8 unread errors, the oldest are lost.
     pub fn take(&self, timeout: Duration) -> Result<Option<Frame>, CameraError> {
         let deadline = Instant::now() + timeout;
         let mut newest = self.shared.lock();

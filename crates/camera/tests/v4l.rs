@@ -242,15 +242,23 @@ fn motion_jpeg_of_a_usb_webcam_without_huffman_tables_is_read() {
 #[ignore = "needs uvcvideo and vhci-hcd: make test-v4l"]
 fn exposure_and_white_balance_of_a_usb_webcam_are_fixed() {
     let usb = UsbCamera::plug_in();
+    drop(open_webcam(&webcam_options(640, 480)));
+    let refused = |options: &OpenOptions| try_open("v4l:sdg test webcam", options).err().unwrap().to_string();
+    let too_long = refused(&OpenOptions { exposure_secs: Some(9.0), ..webcam_options(640, 480) });
+    assert!(too_long.contains("fixed exposure") && too_long.contains("from 1 to 5000, not to 90000"), "{too_long}");
+    let bluish =
+        OpenOptions { exposure_secs: Some(0.01), white_balance_kelvin: Some(9000), ..webcam_options(640, 480) };
+    let bluish = refused(&bluish);
+    assert!(bluish.contains("fixed white balance") && bluish.contains("from 2800 to 6500, not to 9000"), "{bluish}");
+    // A refusal changes nothing: mode 2 is automatic.
+    let settings = usb.settings();
+    assert_eq!((settings.exposure_mode, settings.exposure, settings.white_balance_auto), (2, 156, 1));
     let fixed = OpenOptions { exposure_secs: Some(0.01), white_balance_kelvin: Some(4600), ..webcam_options(640, 480) };
     drop(open_webcam(&fixed));
     // 10 ms are 100 units of 100 µs; mode 1 is manual.
     let settings = usb.settings();
     assert_eq!((settings.exposure_mode, settings.exposure), (1, 100));
     assert_eq!((settings.white_balance_auto, settings.white_balance_kelvin), (0, 4600));
-    let too_long = OpenOptions { exposure_secs: Some(9.0), ..webcam_options(640, 480) };
-    let error = try_open("v4l:sdg test webcam", &too_long).err().unwrap().to_string();
-    assert!(error.contains("fixed exposure") && error.contains("from 1 to 5000, not to 90000"), "{error}");
 }
 
 #[test]

@@ -189,6 +189,37 @@ pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::RgbImage;
+    use sdg_camera::{CameraError, Fault, LatestFrame};
+    use std::sync::mpsc::{Sender, channel};
+
+    /// Twice as many faults as are skipped, then a frame, then the end, before which it sends a message.
+    struct Recovering(u32, Sender<()>);
+
+    impl Camera for Recovering {
+        fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
+            self.0 += 1;
+            match self.0 {
+                number if number <= 2 * MAX_FAULTS => {
+                    Err(CameraError::Fault { camera: "test:".to_owned(), fault: Fault::Black })
+                }
+                number if number == 2 * MAX_FAULTS + 1 => Ok(Some(Frame::new(RgbImage::new(1, 1), 0, "test:".into()))),
+                _ => {
+                    let _ = self.1.send(());
+                    Ok(None)
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn faults_while_nobody_reads_are_skipped() {
+        let (send, has_frame) = channel();
+        let mut camera = LatestFrame::spawn(Box::new(Recovering(0, send)));
+        // The call after the frame shows that the frame is stored.
+        has_frame.recv().unwrap();
+        assert_eq!(next_frame(&mut camera).unwrap().unwrap().number, 0);
+    }
 
     #[test]
     fn what_cannot_be_opened_is_named_with_its_option() {

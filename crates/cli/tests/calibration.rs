@@ -404,6 +404,13 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
     };
     table(&[&other, "--camera", &known], 1, &["other.png", "640 × 480", "1280 × 720"]);
     table(&[a], 2, &["--out FILE"]);
+    let before = fs::read(&known).unwrap();
+    table(
+        &[a, "--out", &known],
+        2,
+        &["known.yaml: expected --camera ", "known.yaml, which keeps its lens, or another"],
+    );
+    assert_eq!(fs::read(&known).unwrap(), before);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400"], 2, &["X,Y"]);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400000,0"], 2, &["5000 mm"]);
     let nonsense = files.text("nonsense.yaml", &fs::read_to_string(&known).unwrap().replace("450.0", "-450.0"));

@@ -4,7 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::support::sdg;
+use crate::camera::WRIST_CAMERA;
+use crate::picture_kinds::with_orientation;
+use crate::support::{Folder, sdg};
 use image::{Rgb, RgbImage};
 use serde_json::Value;
 
@@ -70,25 +72,52 @@ fn one_frame_goes_to_a_file_and_several_to_a_folder() {
     }
 }
 
-#[test]
-fn frames_come_at_their_times_and_are_the_newest() {
+/// The numbers of three frames, grabbed every half second from a camera with ten pictures per second, each 10 levels
+/// brighter than the previous one. The first is followed by a pause.
+fn grabbed_every_half_second(pause_secs: f64) -> Vec<u64> {
     let out = tempfile::tempdir().unwrap();
-    // Ten pictures per second; each is 10 levels brighter than the previous one.
-    let picture =
-        |level: u32| format!("printf 'P6 1 1 255 '; printf '\\\\{level:o}\\\\{level:o}\\\\{level:o}'; sleep 0.1;");
-    let script: String = (1..20).map(|i| picture(i * 10)).collect();
+    let picture = |i: u32| {
+        let (level, secs) = (10 * i, if i == 1 { pause_secs } else { 0.1 });
+        format!("printf 'P6 1 1 255 '; printf '\\{level:o}\\{level:o}\\{level:o}'; sleep {secs};")
+    };
     let file = out.path().join("camera.sh");
-    fs::write(&file, script.replace("\\\\", "\\")).unwrap();
+    fs::write(&file, (1..20).map(picture).collect::<String>()).unwrap();
     let address = format!("cmd:sh '{}'", file.display());
     let folder = out.path().join("frames");
-    let start = std::time::Instant::now();
     let arguments = ["--count", "3", "--every", "0.5", "--json", "--out", folder.to_str().unwrap()];
     let output = sdg(&[&["camera", "grab", "--from", &address], arguments.as_slice()].concat());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect()
+}
+
+#[test]
+fn frames_come_at_their_times_and_are_the_newest() {
+    let start = std::time::Instant::now();
+    let numbers = grabbed_every_half_second(0.1);
     assert!(start.elapsed().as_secs_f64() >= 1.0);
-    let numbers: Vec<u64> = lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect();
     // Half a second is five pictures, fewer on a busy machine. Without skipping, the pictures would be 0, 1, 2.
     assert!(numbers[1] >= numbers[0] + 2 && numbers[2] >= numbers[1] + 2, "{numbers:?}");
+    // In a pause, the time of the second and of the third frame passes; the third is still half a second later.
+    let numbers = grabbed_every_half_second(1.3);
+    assert!(numbers[2] >= numbers[1] + 2, "{numbers:?}");
+}
+
+#[test]
+fn frames_of_a_calibrated_camera_have_its_stored_pixels_and_its_size() {
+    let files = Folder::new();
+    let stored = RgbImage::from_fn(640, 480, |x, _| Rgb([if x < 320 { 50 } else { 200 }; 3]));
+    fs::write(files.path("photo.jpg"), with_orientation(&stored.into(), 3)).unwrap();
+    let (address, out) = (format!("file:{}", files.path("photo.jpg")), files.path("out.png"));
+    let grab = |further: &[&str]| sdg(&[&["camera", "grab", "--from", &address, "--out", &out], further].concat());
+    let level_of = |further: &[&str]| {
+        let output = grab(further);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        level(Path::new(&out))
+    };
+    let wrist = files.text("wrist.yaml", WRIST_CAMERA);
+    assert!(level_of(&[]).abs_diff(200) < 10 && level_of(&["--camera", &wrist]).abs_diff(50) < 10);
+    let wide = files.text("wide.yaml", &WRIST_CAMERA.replace("image_width: 640", "image_width: 1280"));
+    assert_refused(&grab(&["--camera", &wide]), 1, &["frame 0 of file:", "1280 × 480", "640 × 480"]);
 }
 
 #[test]

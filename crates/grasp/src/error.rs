@@ -56,11 +56,11 @@ pub enum GraspError {
     #[error(transparent)]
     Region(#[from] crate::region::RegionError),
     /// A grasp whose ray misses the marks' plane.
-    #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at a height of {height_m} m")]
+    #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at z = {height_m} m")]
     OffPlane {
         x: f64,
         y: f64,
-        /// Height of the plane, in metres.
+        /// The plane's z in the camera's world, in metres.
         height_m: f64,
     },
     /// No plan view can be made.

@@ -22,6 +22,11 @@ impl Luminance {
         self.width.max(self.height) as u32
     }
 
+    /// Whether a halved picture has a pixel.
+    pub(super) fn can_be_halved(&self) -> bool {
+        self.width.min(self.height) >= 2
+    }
+
     /// The value of a pixel.
     pub(super) fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]

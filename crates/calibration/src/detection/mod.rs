@@ -26,8 +26,8 @@ use crate::error::CalibrationError;
 
 /// Minimum number of corners of a usable board: three by three.
 pub const MIN_CORNERS: usize = 9;
-/// Pictures are halved as long as their longer side stays at least this: corners of a blurred picture are only found at
-/// low resolution.
+/// Pictures are halved as long as their longer side stays at least this, and both sides have a pixel: corners of a
+/// blurred picture are only found at low resolution.
 const MIN_SIDE: u32 = 160;
 /// Pictures with a longer side above this are halved before the first search.
 const MAX_SIDE: u32 = 2000;
@@ -44,7 +44,7 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
     let full = Luminance::of(picture);
     let mut level = full.clone();
     let mut scale = 1.0;
-    while level.longer_side() > MAX_SIDE {
+    while level.longer_side() > MAX_SIDE && level.can_be_halved() {
         level = level.halved();
         scale *= 2.0;
     }
@@ -73,7 +73,7 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }
-        if found.len() == board.num_corners() || level.longer_side() < 2 * MIN_SIDE {
+        if found.len() == board.num_corners() || level.longer_side() < 2 * MIN_SIDE || !level.can_be_halved() {
             break;
         }
         level = level.halved();

@@ -88,37 +88,47 @@ fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
     })
 }
 
-/// Sets a fixed exposure and white balance if requested.
+/// Sets a fixed exposure and white balance if requested. All values are checked before the first one is written, so that
+/// a refused setting does not leave the camera in a manual mode.
 fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Result<(), CameraError> {
-    let mut set = |setting: &'static str, values: [(Cid, i32); 2]| {
-        for (control, value) in values {
-            let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
-            let refused = |found: String| CameraError::Setting { address: address.to_owned(), setting, found };
-            let range = range.ok_or_else(|| refused(format!("no V4L2 control {control:?}")))?;
-            if !(range.minimum()..=range.maximum()).contains(&value) {
-                let found = format!(
-                    "that {} goes from {} to {}, not to {value}",
-                    range.name(),
-                    range.minimum(),
-                    range.maximum()
-                );
-                return Err(refused(found));
-            }
-            device
-                .write_control_raw(control, value)
-                .map_err(|error| refused(format!("that it rejects {value}: {error}")))?;
-        }
-        Ok(())
-    };
+    let refused =
+        |setting: &'static str, found: String| CameraError::Setting { address: address.to_owned(), setting, found };
+    let values = requested_values(options);
+    for &(setting, control, value) in &values {
+        check_value(device, control, value).map_err(|found| refused(setting, found))?;
+    }
+    for (setting, control, value) in values {
+        let written = device.write_control_raw(control, value);
+        written.map_err(|error| refused(setting, format!("that it rejects {value}: {error}")))?;
+    }
+    Ok(())
+}
+
+/// The requested values, each with the name of its setting, in the order of writing.
+fn requested_values(options: &OpenOptions) -> Vec<(&'static str, Cid, i32)> {
+    let mut values = Vec::new();
     if let Some(secs) = options.exposure_secs {
         let units = (secs * EXPOSURE_UNITS_PER_SEC).round() as i32;
-        set("fixed exposure", [(Cid::EXPOSURE_AUTO, EXPOSURE_MANUAL), (Cid::EXPOSURE_ABSOLUTE, units)])?;
+        let controls = [(Cid::EXPOSURE_AUTO, EXPOSURE_MANUAL), (Cid::EXPOSURE_ABSOLUTE, units)];
+        values.extend(controls.map(|(control, value)| ("fixed exposure", control, value)));
     }
     if let Some(kelvin) = options.white_balance_kelvin {
         let kelvin = i32::try_from(kelvin).unwrap_or(i32::MAX);
-        set("fixed white balance", [(Cid::AUTO_WHITE_BALANCE, 0), (Cid::WHITE_BALANCE_TEMPERATURE, kelvin)])?;
+        let controls = [(Cid::AUTO_WHITE_BALANCE, 0), (Cid::WHITE_BALANCE_TEMPERATURE, kelvin)];
+        values.extend(controls.map(|(control, value)| ("fixed white balance", control, value)));
     }
-    Ok(())
+    values
+}
+
+/// Checks that the device has a control, and the value is in its range; the error says what was found.
+fn check_value(device: &Device, control: Cid, value: i32) -> Result<(), String> {
+    let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
+    let range = range.ok_or_else(|| format!("no V4L2 control {control:?}"))?;
+    let (min, max) = (range.minimum(), range.maximum());
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(format!("that {} goes from {min} to {max}, not to {value}", range.name()))
 }
 
 struct Stream {

@@ -18,6 +18,7 @@ use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
 use super::posed::PosedCamera;
+use crate::{Polygon, convex_hull};
 
 /// A rectangle of the world in which parts may lie, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,10 +52,10 @@ pub struct PlanView {
 pub enum PlanViewError {
     /// The camera does not look at the plane.
     #[error(
-        "expected the camera to look down at the plane {height_m} m above the table; the middle of its picture does not show it"
+        "expected the camera to look down at the plane at z = {height_m} m; the middle of its picture does not show it"
     )]
     NotInView {
-        /// The plane's height in the world.
+        /// The plane's z in the world, in metres.
         height_m: f64,
     },
     /// The picture shows nothing of the workspace.
@@ -67,11 +68,13 @@ pub enum PlanViewError {
         seen: Workspace,
     },
     /// More pixels than allowed.
-    #[error("expected a plan view of at most {max} pixels, found {found}: give a smaller workspace")]
+    #[error(
+        "expected a plan view of at most {max} pixels, found {found}: take the photo from the look-out height or with fewer pixels, or give a smaller workspace"
+    )]
     TooLarge {
         /// Pixels allowed.
         max: u64,
-        /// Pixels that it would have.
+        /// Pixels of the visible area.
         found: u64,
     },
 }
@@ -82,12 +85,16 @@ const GRID: u32 = 32;
 /// Maximum length of a pixel on the plane, as a multiple of the smallest one. Towards the horizon, longer pixels show
 /// too little to find parts. Chosen by hand.
 const MAX_COARSENING: f64 = 4.0;
+/// Maximum size of the view's rectangle, as a multiple of the maximum visible area, so that the memory is limited where
+/// little of the rectangle is visible. The ratio is 2.2 for a picture of 16:9 rotated by 45°. Chosen by hand.
+const MAX_RECTANGLE_RATIO: f64 = 4.0;
 
 impl PlanView {
     /// The part of the plane at `height_m` that `camera` shows, within the workspace.
     ///
     /// # Errors
-    /// The camera does not look at the plane or the workspace, or the view would have more than `max_pixels`.
+    /// The camera does not look at the plane or the workspace, or the visible area would have more than `max_pixels`.
+    /// Unlike the view's rectangle, this area does not depend on the camera's rotation about the vertical.
     pub fn of(
         camera: &PosedCamera,
         height_m: f64,
@@ -96,21 +103,30 @@ impl PlanView {
         max_pixels: u64,
     ) -> Result<Self, PlanViewError> {
         let seen = seen_of_plane(camera, height_m).ok_or(PlanViewError::NotInView { height_m })?;
+        let bounds = Workspace::around(&seen);
         let shown = match workspace {
-            None => seen,
-            Some(workspace) => {
-                seen.intersection(workspace).ok_or(PlanViewError::OutsideWorkspace { workspace: *workspace, seen })?
-            }
+            None => bounds,
+            Some(workspace) => bounds
+                .intersection(workspace)
+                .ok_or(PlanViewError::OutsideWorkspace { workspace: *workspace, seen: bounds })?,
         };
         // A rounding error must not add a pixel.
         let side = |[low, high]: [f64; 2]| ((high - low) * pixels_per_m - 1e-6).ceil().max(1.0);
         let [width, height] = [shown.x_m, shown.y_m].map(side);
-        let found = (width * height) as u64;
+        let rectangle = width * height;
+        let [width, height] = [width, height].map(|side| side as u32);
+        let view = Self { height_m, pixels_per_m, left_m: shown.x_m[0], top_m: shown.y_m[1], width, height };
+        let found = view.visible_area(&seen).max(rectangle / MAX_RECTANGLE_RATIO) as u64;
         if found > max_pixels {
             return Err(PlanViewError::TooLarge { max: max_pixels, found });
         }
-        let [width, height] = [width, height].map(|side| side as u32);
-        Ok(Self { height_m, pixels_per_m, left_m: shown.x_m[0], top_m: shown.y_m[1], width, height })
+        Ok(view)
+    }
+
+    /// The area of the view in which these points of the plane and those between them lie, in square pixels.
+    fn visible_area(&self, seen: &[Point3<f64>]) -> f64 {
+        let hull = Polygon { vertices: convex_hull(seen.iter().map(|point| self.pixel(point))) };
+        hull.clip(f64::from(self.width), f64::from(self.height)).area()
     }
 
     /// The point of the plane at a pixel.
@@ -138,6 +154,15 @@ impl PlanView {
 }
 
 impl Workspace {
+    /// The smallest rectangle with all points.
+    fn around(points: &[Point3<f64>]) -> Self {
+        let bounds = |coordinate: fn(&Point3<f64>) -> f64| {
+            let values = || points.iter().map(coordinate);
+            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        Self { x_m: bounds(|point| point.x), y_m: bounds(|point| point.y) }
+    }
+
     fn intersection(&self, other: &Self) -> Option<Self> {
         let both = |a: [f64; 2], b: [f64; 2]| {
             let [low, high] = [a[0].max(b[0]), a[1].min(b[1])];
@@ -147,8 +172,8 @@ impl Workspace {
     }
 }
 
-/// The rectangle of the plane that the picture shows well.
-fn seen_of_plane(camera: &PosedCamera, height_m: f64) -> Option<Workspace> {
+/// Points of the plane that the picture shows well, at least two.
+fn seen_of_plane(camera: &PosedCamera, height_m: f64) -> Option<Vec<Point3<f64>>> {
     let [width, height] = [camera.intrinsics.width, camera.intrinsics.height].map(f64::from);
     camera.at_height(&Point2::new(0.5 * width, 0.5 * height), height_m)?;
     let places = (0..=GRID).flat_map(|row| (0..=GRID).map(move |column| [column, row]));
@@ -160,12 +185,9 @@ fn seen_of_plane(camera: &PosedCamera, height_m: f64) -> Option<Workspace> {
         .filter_map(|pixel| Some((camera.at_height(&pixel, height_m)?, camera.metres_per_pixel(&pixel, height_m)?)))
         .collect();
     let finest = seen.iter().map(|(_, length)| *length).fold(f64::INFINITY, f64::min);
-    let well: Vec<_> = seen.iter().filter(|(_, length)| *length <= MAX_COARSENING * finest).collect();
-    let bounds = |coordinate: fn(&Point3<f64>) -> f64| {
-        let values = || well.iter().map(|(point, _)| coordinate(point));
-        [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
-    };
-    (well.len() > 1).then(|| Workspace { x_m: bounds(|point| point.x), y_m: bounds(|point| point.y) })
+    let well: Vec<_> =
+        seen.into_iter().filter(|(_, length)| *length <= MAX_COARSENING * finest).map(|(point, _)| point).collect();
+    (well.len() > 1).then_some(well)
 }
 
 #[cfg(test)]
@@ -211,13 +233,29 @@ mod tests {
         let of = |tilt_deg: f64, workspace: Option<&Workspace>, max| {
             PlanView::of(&camera(tilt_deg), 0.0, 1000.0, workspace, max)
         };
-        assert!(matches!(of(120.0, None, u64::MAX), Err(PlanViewError::NotInView { .. })));
+        let away = of(120.0, None, u64::MAX).unwrap_err();
+        assert!(matches!(away, PlanViewError::NotInView { .. }) && away.to_string().contains("at z = 0 m"), "{away}");
         assert!(matches!(of(0.0, None, 1000), Err(PlanViewError::TooLarge { max: 1000, .. })));
         let elsewhere = Workspace { x_m: [2.0, 3.0], y_m: [0.0, 1.0] };
         assert!(matches!(of(0.0, Some(&elsewhere), u64::MAX), Err(PlanViewError::OutsideWorkspace { .. })));
         let near = Workspace { x_m: [-0.1, 0.1], y_m: [-0.05, 3.0] };
         let view = of(0.0, Some(&near), u64::MAX).unwrap();
         assert!(view.width == 200 && view.left_m == -0.1 && view.top_m < 0.5, "{view:?}");
+    }
+
+    #[test]
+    fn a_rotated_picture_may_have_as_many_pixels() {
+        let intrinsics = PinholeCamera::symmetric(2048, 1536, 1800.0);
+        for yaw_deg in [0.0_f64, 45.0] {
+            let mut camera = PosedCamera { intrinsics, ..camera(0.0) };
+            let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
+            camera.world_from_camera.rotation = yaw * camera.world_from_camera.rotation;
+            // 0.564 m away: a pixel of the view is a pixel of the picture. The rectangle has 6.4 million at 45°.
+            let of = |max| PlanView::of(&camera, 0.016, 1800.0 / 0.564, None, max);
+            assert!(of(6_000_000).is_ok(), "{yaw_deg}: {:?}", of(6_000_000));
+            let refused = of(3_100_000);
+            assert!(matches!(refused, Err(PlanViewError::TooLarge { found: 3_140_000..3_150_000, .. })), "{refused:?}");
+        }
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub struct PlanViewDetection {
     pub pose: PlanarPose,
 }
 
-/// Maximum number of pixels of a plan view, above which a search becomes slow. Chosen by hand.
+/// Maximum number of pixels of a plan view's visible area, above which a search becomes slow. Chosen by hand.
 const MAX_PLAN_PIXELS: u64 = 6_000_000;
 
 /// A model used with a calibrated camera.

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use sdg_camera::{Address, Frame, LatestFrame};
+use sdg_calibration::CalibratedCamera;
+use sdg_camera::{Address, Frame, LatestFrame, OpenOptions, PixelFrame};
+use sdg_inputs::camera_files;
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
@@ -18,6 +20,10 @@ use crate::live_pictures::{LiveArgs, next_frame, open};
 pub struct GrabArgs {
     #[command(flatten)]
     pub live: LiveArgs,
+    /// The file of the calibrated camera, for frames that are used with --camera: they must have its size, and are not
+    /// rotated as an Exif orientation says
+    #[arg(long, value_name = "FILE")]
+    pub camera: Option<PathBuf>,
     /// Number of frames
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub count: u32,
@@ -49,25 +55,31 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
     }
+    let calibrated = args.camera.as_deref().map(camera_files::read).transpose()?.map(|(camera, _)| camera);
     if let Address::File { path, .. } | Address::Folder { path, .. } = &args.live.from {
         sdg_files::keep(path);
     }
     let interrupt = Interrupt::watch();
-    let mut camera = open(&args.live.from, &args.live.options())?;
+    let mut camera = open(&args.live.from, &options(&args.live, calibrated.as_ref()))?;
     // A live camera delivers frames during the wait: the newest frame is taken, and older ones are dropped.
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
     }
-    let start = Instant::now();
+    let mut due = Instant::now();
     let mut num_written = 0;
     while num_written < args.count && !interrupt.is_requested() {
-        let due = start + Duration::from_secs_f64(args.every * f64::from(num_written));
         while Instant::now() < due && !interrupt.is_requested() {
             std::thread::sleep(due.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)));
         }
         let Some(frame) = next_frame(camera.as_mut())? else {
             break;
         };
+        // From this frame and not from the start: after a pause of the camera, missed frames are not made up for.
+        due = Instant::now() + Duration::from_secs_f64(args.every);
+        if let Some(calibrated) = &calibrated {
+            let size = frame.picture.dimensions();
+            calibrated.check_picture(size).with_context(|| format!("frame {} of {}", frame.number, args.live.from))?;
+        }
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
         sdg_files::write_png(&path, &frame.picture)?;
         print_frame(&path, &frame, args.json)?;
@@ -81,6 +93,18 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         eprintln!("sdg: {num_written} of {} frames; {why}", args.count);
     }
     Ok(Outcome::Done)
+}
+
+/// The settings of the camera; those of a calibrated camera give its size and the pixels that were calibrated.
+fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> OpenOptions {
+    let mut options = live.options();
+    if let Some(calibrated) = calibrated {
+        options.frame = PixelFrame::Sensor;
+        if live.request.size.is_none() {
+            (options.width, options.height) = (calibrated.intrinsics.width, calibrated.intrinsics.height);
+        }
+    }
+    options
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use nalgebra::Vector3;
 use sdg_calibration::{
-    ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPlacement, SheetPose, bent_px, focal_cost,
-    guess_camera, locate_sheet, pose_json,
+    ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPlacement, SheetPose, UNCALIBRATED,
+    bent_px, focal_cost, guess_camera, locate_sheet, pose_json,
 };
 use sdg_inputs::{BoardPicture, camera_files};
 use serde_json::{Value, json};
@@ -69,7 +69,8 @@ pub struct TableArgs {
     /// Focal length in pixels, for a camera without a file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// The file to write, with `table:`; default: the camera file
+    /// The file to write, with `table:`; default: the camera file. The file of a calibrated camera is not replaced
+    /// without --camera
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -91,6 +92,9 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
     sdg_files::check_extendable(out, args.camera.as_deref())?;
+    if existing.is_none() {
+        check_is_not_calibrated(out)?;
+    }
     let camera_in_use = existing.as_ref().map(|(camera, _)| camera);
     let BoardPicture { size, corners, .. } = BoardPicture::read(&args.picture, &board, camera_in_use)?;
     let (camera, source) = match &existing {
@@ -118,6 +122,17 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     sdg_files::extend(out, args.camera.as_deref(), text.as_bytes())?;
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
+}
+
+/// Checks that a file which is replaced by an estimated camera does not contain a calibrated one. It is not registered
+/// as an input, because it may be replaced.
+fn check_is_not_calibrated(out: &Path) -> Result<()> {
+    let Ok(text) = std::fs::read_to_string(out) else { return Ok(()) };
+    if CalibratedCamera::from_yaml(&text).is_ok_and(|camera| camera.name != UNCALIBRATED) {
+        let out = named(out);
+        return Err(Usage(format!("{out}: expected --camera {out}, which keeps its lens, or another --out")).into());
+    }
+    Ok(())
 }
 
 /// The sheet's position and direction in the frame of the camera file.
