@@ -3,6 +3,9 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
+/// Name of a project's file in its folder, and extension of the file of a photo's project.
+pub const PROJECT_FILE: &str = "sdg-project.json";
+
 /// The last part of a path, for display.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
@@ -60,15 +63,21 @@ pub fn free_name(beside: &Path, name: &str, extension: &str) -> PathBuf {
     free_numbered(&beside.with_file_name(format!("{stem}.{extension}")))
 }
 
-/// The path itself or, if a picture or marks with that name exist, the path with a number.
+/// The path itself or, if a picture, marks or a project with that name exist, the path with a number.
 pub fn free_numbered(path: &Path) -> PathBuf {
+    free_numbered_except(path, &[])
+}
+
+/// Like [`free_numbered`], also different from these names.
+pub fn free_numbered_except(path: &Path, names: &[String]) -> PathBuf {
     let (stem, extension) = (path.file_stem().unwrap_or_default(), path.extension().unwrap_or_default());
     let numbered = |n: usize| match n {
         1 => path.to_owned(),
         _ => path.with_file_name(format!("{}-{n}.{}", stem.to_string_lossy(), extension.to_string_lossy())),
     };
-    let marks = |path: &Path| ["json", "coco.json"].iter().any(|extension| path.with_extension(extension).exists());
-    let taken = |path: &Path| path.exists() || marks(path);
+    let records = ["json", "coco.json", PROJECT_FILE];
+    let has_records = |path: &Path| records.iter().any(|extension| path.with_extension(extension).exists());
+    let taken = |path: &Path| path.exists() || has_records(path) || names.contains(&file_name(path));
     (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 

@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
 use crate::model_versions::{Version, now_secs};
-use crate::names::{file_name, free_numbered, safe_stem};
+use crate::names::{file_name, free_numbered_except, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::ProjectPlace;
@@ -90,6 +90,9 @@ pub struct Session {
     /// Orientation of the pixels of all pictures.
     pixel_frame: PixelFrame,
     live: Option<LiveDesk>,
+    /// Names in the project of the camera's folder. A new photo does not get the name of a missing one, whose project
+    /// would be written over.
+    taken_names: Vec<String>,
     /// Folder for pictures added on the page before there is a photo.
     temporary: Option<TempDir>,
     /// Locks that keep other programs from writing the same files.
@@ -287,7 +290,7 @@ impl Session {
     /// # Errors
     /// [`Error::NoCamera`].
     pub(crate) fn next_photo(&self) -> Result<PathBuf> {
-        Ok(free_numbered(&self.live_desk()?.options.photo_path))
+        Ok(free_numbered_except(&self.live_desk()?.options.photo_path, &self.taken_names))
     }
 
     /// Writes a shown frame as PNG, under an unused name, and makes it a photo of the object.

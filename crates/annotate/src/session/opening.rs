@@ -8,10 +8,10 @@ use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
 use crate::model_versions::ModelVersions;
-use crate::names::proposed_label;
+use crate::names::{free_numbered, proposed_label};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project, relative};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -20,9 +20,9 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture, or a
-    /// photo of a calibrated camera that an Exif orientation rotates. Unreadable pictures of the project or of a folder
-    /// are left out; the notes for the user name them.
+    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture, another
+    /// file in the place of a project's, or a photo of a calibrated camera that an Exif orientation rotates. Unreadable
+    /// pictures of the project or of a folder are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -117,6 +117,7 @@ impl Session {
             region,
             is_model_lost,
         };
+        let taken_names = options.live.as_ref().map(|live| names_in_project(&live.photo_path)).transpose()?;
         state.save_project()?;
         Ok(Self {
             teacher,
@@ -126,6 +127,7 @@ impl Session {
             home,
             pixel_frame: options.pixel_frame,
             live: options.live.clone().map(LiveDesk::new),
+            taken_names: taken_names.unwrap_or_default(),
             temporary,
             locks: Vec::new(),
             state: Arc::new(Mutex::new(state)),
@@ -152,7 +154,8 @@ impl Session {
         for trial in &mut state.trial_pictures {
             let path = &trial.picture.path;
             if let Ok(name) = path.strip_prefix(temporary.path()) {
-                let kept = folder.join(name);
+                // The folder may have pictures of another project.
+                let kept = free_numbered(&folder.join(name));
                 std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
                 std::fs::copy(path, &kept).map_err(Error::file(&kept, "cannot write"))?;
                 trial.picture.path = kept;

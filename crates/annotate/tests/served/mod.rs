@@ -271,7 +271,11 @@ impl Served {
 
     /// A server with a camera and no photo, in an empty folder.
     pub fn with_camera(pictures: Arc<dyn LivePictures>) -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        Self::with_camera_in(tempfile::tempdir().unwrap(), pictures)
+    }
+
+    /// A server with a camera that writes its photos into a folder.
+    pub fn with_camera_in(folder: tempfile::TempDir, pictures: Arc<dyn LivePictures>) -> Self {
         let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
         let options = SessionOptions { live: Some(live), ..SessionOptions::default() };
         Self::open(folder, options, PATIENCE)
