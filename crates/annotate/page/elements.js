@@ -2,6 +2,13 @@
 
 export const by = (id) => document.getElementById(id);
 
+export const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Sets a text only if it differs: screen readers announce every text that is set. */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 /** A new element with these fields. */
 export const element = (tag, fields) => Object.assign(document.createElement(tag), fields);
 

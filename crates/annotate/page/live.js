@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
-import { by, element, offBecause } from "./elements.js";
+import { by, element, offBecause, setText, wait } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -31,7 +31,6 @@ const FAULTS = {
   lost: "No answer",
 };
 
-const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const isPaused = () => state.tab === "try" && state.live.paused;
 
 /** Requests the newest frame as long as the live picture is shown. */
@@ -165,10 +164,6 @@ by("back-to-photos").addEventListener("click", toggleCamera);
 by("camera-button").addEventListener("click", toggleCamera);
 by("live-toggle").addEventListener("click", toggleLive);
 by("live-keep").addEventListener("click", keepPicture);
-
-function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
-}
 
 /** A grasp's position in words: in pixels of the picture, and over the table if the camera is calibrated. */
 export function placeText({ marks, pose }) {

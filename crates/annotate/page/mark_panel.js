@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
-import { button, by, element, offBecause } from "./elements.js";
+import { button, by, element, offBecause, setText } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
@@ -84,7 +84,7 @@ function renderSaved({ saved }) {
     nothing: () => (marks().grasp ? "Kept here; saved as soon as there is a box" : "Nothing marked yet"),
     refused: () => `Not saved: ${saved.why}`,
   }[saved.state]();
-  if (line.textContent !== text) line.textContent = text;
+  setText(line, text);
   line.className = `saved ${saved.state}`;
 }
 
@@ -204,6 +204,5 @@ function renderTools() {
   offBecause(by("delete"), !(state.draft || (state.selected && image()?.marks[state.selected])) && "Select a mark first");
   by("mark-tools").hidden = by("edit-tools").hidden = by("in-out").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
-  const text = marking ? hint() : "";
-  if (by("hint").textContent !== text) by("hint").textContent = text;
+  setText(by("hint"), marking ? hint() : "");
 }

@@ -3,7 +3,7 @@
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, save } from "./editing.js";
-import { by, stored } from "./elements.js";
+import { by, stored, wait } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
@@ -126,7 +126,7 @@ export function renderUnsaved() {
 /** Checks repeatedly whether the server answers. */
 export async function beat() {
   for (;;) {
-    await new Promise((resolve) => setTimeout(resolve, isLost() ? RETRY_MS : BEAT_MS));
+    await wait(isLost() ? RETRY_MS : BEAT_MS);
     if (isLost()) {
       keep();
       await meetAgain();

@@ -1,13 +1,13 @@
 // The third step: teaching, and its progress.
 
 import { api } from "./api.js";
-import { by, element, offBecause } from "./elements.js";
+import { by, element, offBecause, setText, wait } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
 import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
-import { percent, seconds } from "./words.js";
+import { listText, percent, seconds } from "./words.js";
 
 const POLL_MS = 400;
 const MODELS = [
@@ -91,7 +91,7 @@ by("teach-stop").addEventListener("click", async () => {
 /** Requests progress until the teaching has ended. */
 export async function watch() {
   while (isRunning()) {
-    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    await wait(POLL_MS);
     try {
       const news = await api.teaching();
       const isDone = news.status === "done";
@@ -165,14 +165,13 @@ function renderOutcome(news) {
     const better = grade === "good" ? "" : " Your own pictures teach it better.";
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
-  if (outcome.textContent !== text) outcome.textContent = text;
+  setText(outcome, text);
   by("teach-error").hidden = news.status !== "failed";
   by("teach-error").textContent = news.error ?? "";
   const hasChanged = news.status === "done" && isOld(state.models.at(-1));
   outcome.classList.toggle("outdated", hasChanged);
   by("teach-old").hidden = !hasChanged;
-  const old = hasChanged ? `This result is old: ${OLD}. Teach again.` : "";
-  if (by("teach-old").textContent !== old) by("teach-old").textContent = old;
+  setText(by("teach-old"), hasChanged ? `This result is old: ${OLD}. Teach again.` : "");
   by("go-try").hidden = news.status !== "done";
   by("go-try").classList.toggle("primary", !hasChanged);
   by("teach-start").classList.toggle("primary", news.status !== "done" || hasChanged);
@@ -224,7 +223,7 @@ export function renderTeach() {
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
-    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${new Intl.ListFormat("en").format(lacks)}`;
+    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${listText(lacks)}`;
     offBecause(input, reason);
     input.closest("label").title = reason || "";
     if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;

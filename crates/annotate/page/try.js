@@ -1,7 +1,7 @@
 // The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
 import { api } from "./api.js";
-import { button, by, element } from "./elements.js";
+import { button, by, element, setText } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
@@ -150,7 +150,7 @@ function renderLearnt() {
   }
   by("learnt").hidden = !text;
   by("learnt").className = isGood ? "learnt" : "warning";
-  if (by("learnt").textContent !== text) by("learnt").textContent = text;
+  setText(by("learnt"), text);
 }
 
 by("save-csv").addEventListener("click", () => exportPictures("csv"));
@@ -292,9 +292,8 @@ function renderJudge() {
   const counted = `${isLow ? `Above ${least}:` : "Found"} ${above} of ${places.length} candidates${isLow ? "" : ` at ${least}`}, in ${inPictures} of ${looked.length} pictures`;
   const waiting = looked.length < all ? ` (${all - looked.length} are still looked at)` : "";
   const low = isLow ? ` ${sure} of them reach${sure === 1 ? "es" : ""} the model’s limit of ${MODEL_LIMIT.toFixed(2)}; those below it are often wrong.` : "";
-  const words = looked.length ? `${counted}${waiting}.${low}${beyond}` : beyond.trim();
   by("least-score-count").classList.toggle("warning", isLow);
-  if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
+  setText(by("least-score-count"), looked.length ? `${counted}${waiting}.${low}${beyond}` : beyond.trim());
   by("looked").hidden = looked.length === all || all < 2;
   Object.assign(by("looked"), { max: Math.max(all, 1), value: looked.length });
   by("export").hidden = !looked.length;
