@@ -2,10 +2,11 @@
 // back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
-import { adopt, save } from "./editing.js";
+import { adopt, adoptChange, save } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
+import { follow } from "./teach.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
 
@@ -110,6 +111,20 @@ export async function sendKept() {
 
 window.addEventListener("pagehide", () => keep());
 
+/** Adopts marks that another page of the session has changed; the next change here would write over them. */
+async function adoptChanges() {
+  if (isLost() || document.hidden) return;
+  const before = state.images.map((target) => [target, target.revision]);
+  // If the server is gone, a banner says so.
+  const session = await api.session().catch(() => null);
+  for (const [target, revision] of before) {
+    const view = session?.images.find(({ id }) => id === target.id);
+    if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
+  }
+  changed();
+}
+for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);
+
 /** A banner shown as long as marks could not be written. */
 export function renderUnsaved() {
   const unsaved = state.images.filter(({ saved }) => saved.by_disk);
@@ -133,7 +148,7 @@ export async function beat() {
     } else {
       if (!state.images.some(isUnsaved)) stored(keptKey(), null);
       state.images.filter(({ saved }) => saved.by_disk).forEach(save);
-      if (!document.hidden) await api.teaching().catch(() => null);
+      if (!document.hidden) await api.teaching().then(follow, () => null);
     }
   }
 }

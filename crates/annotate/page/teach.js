@@ -97,13 +97,21 @@ export async function watch() {
       const isDone = news.status === "done";
       // Nothing is shown between the end of the teaching and its model: results of the model before would be taken for the new one's.
       const models = isDone ? (await api.session().catch(() => state)).models : state.models;
+      // Another call of this function may have been faster.
+      if (isDone && isRunning()) searchAgain({ compares: true });
       Object.assign(state, { teaching: news, models });
-      if (isDone) searchAgain({ compares: true });
     } catch (error) {
       if (!error.lost) toast(error.message);
     }
     changed();
   }
+}
+
+/** Follows a teaching that another page has started, or adopts its end. */
+export function follow(news) {
+  if (isRunning() || news.elapsed_secs === state.teaching.elapsed_secs || !/running|done/.test(news.status)) return;
+  state.teaching = { ...news, status: "running" };
+  watch();
 }
 
 /** What a model is or was taught from, in words. */

@@ -93,6 +93,17 @@ fn an_answer_of_the_model_before_is_discarded_and_the_picture_searched_again() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn a_model_that_another_page_taught_is_adopted() {
+    let page = marked();
+    let teach =
+        "return fetch('/api/teaching', { method: 'POST', body: '{\"model\": \"S\"}' }).then((answer) => answer.ok)";
+    assert_eq!(page.browser.run(teach, &[]).unwrap(), json!(true));
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 1");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
     let page = taught();
     // The results of a second version are invented; they are inserted after the page has asked for the versions.
