@@ -2,7 +2,7 @@
 // back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
-import { adopt, adoptChange, save } from "./editing.js";
+import { adopt, adoptChange, save, textOf } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
@@ -100,7 +100,7 @@ export async function sendKept() {
   for (const [name, { was, marks }] of Object.entries(JSON.parse(text))) {
     const target = state.images.find((image) => image.name === name);
     // Marks changed elsewhere since then are not overwritten.
-    if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
+    if (!target || textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
     target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
     sent.push(save(target).then(() => target.saved.state === "written"));

@@ -446,6 +446,28 @@ fn kept_marks_wait_for_their_project_while_another_is_open_at_the_same_port() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn kept_marks_are_sent_although_their_file_has_a_box_of_the_outline() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
+    let draw = "return Promise.all(['store', 'editing'].map((name) => import(`/page/${name}.js`)))
+        .then(([{ marks }, { commit }]) => {
+            Object.assign(marks(), { box: null, outline: [[260, 170], [385, 170], [385, 275], [260, 275]] });
+            commit();
+        })";
+    page.browser.run(draw, &[]).unwrap();
+    page.wait_for("saved", "return document.getElementById('saved').innerText === 'Saved in photo.coco.json'");
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.browser.press(&["]"]).unwrap();
+    are_kept(&page);
+    page.browser.open("about:blank").unwrap();
+    page.start_server();
+    page.browser.open(&page.url.clone()).unwrap();
+    let sent = "return document.getElementById('toasts').innerText.includes('kept in this browser are saved now')";
+    page.wait_for("the marks to be sent", sent);
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn on_a_full_disk_a_banner_stays_and_saving_is_tried_again() {
     let page = open(&[], &["photo"]);
     let saved = page.folder.path().join("project/photo.coco.json");
