@@ -9,6 +9,14 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Whether an element shows this content already; if not, the caller shows it now. */
+export function shows(element, content) {
+  const key = JSON.stringify(content);
+  if (element.dataset.shown === key) return true;
+  element.dataset.shown = key;
+  return false;
+}
+
 /** A new element with these fields. */
 export const element = (tag, fields) => Object.assign(document.createElement(tag), fields);
 

@@ -4,7 +4,7 @@
 // done with model S only, which is taught in a second. Only the user knows whether the part is where it was refused.
 
 import { api } from "./api.js";
-import { button, by } from "./elements.js";
+import { button, by, shows } from "./elements.js";
 import { isFound, isLive, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
@@ -73,9 +73,7 @@ export function renderHelps() {
   const helps = by("helps");
   helps.hidden = !text;
   const isElsewhere = Boolean(candidate) && candidate !== trialPicture();
-  const wanted = `${text}${isElsewhere}`;
-  if (helps.dataset.shown === wanted) return;
-  helps.dataset.shown = wanted;
+  if (shows(helps, [text, isElsewhere])) return;
   helps.replaceChildren(text);
   if (isElsewhere) helps.append(" ", button("Look at it", () => openTrialPicture(state.trialPictures.indexOf(candidate)), "plain"));
 }

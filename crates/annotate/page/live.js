@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
-import { by, element, offBecause, setText, wait } from "./elements.js";
+import { by, element, offBecause, setText, shows, wait } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -239,9 +239,7 @@ function renderTrying() {
   const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : `${isRunning() ? "A model is being taught" : "Teach a model first"}: it then looks for the part here.`;
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
-  const text = JSON.stringify(told);
-  if (by("live-found").dataset.shown === text) return;
-  by("live-found").dataset.shown = text;
+  if (shows(by("live-found"), told)) return;
   by("live-found").replaceChildren(...told.map(([title, score, pose, touching]) => {
     const item = element("div");
     item.className = "found";

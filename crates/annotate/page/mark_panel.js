@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
-import { button, by, element, offBecause, setText } from "./elements.js";
+import { button, by, element, offBecause, setText, shows } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
@@ -129,9 +129,7 @@ function fix(remedy) {
 
 function renderAdvice({ advice }) {
   const list = by("remarks");
-  const remarks = JSON.stringify(advice.remarks);
-  if (list.dataset.shown !== remarks) {
-    list.dataset.shown = remarks;
+  if (!shows(list, advice.remarks)) {
     list.replaceChildren(...advice.remarks.map((remark) => {
       const item = element("li");
       item.dataset.code = remark.code;
@@ -147,9 +145,7 @@ function renderAdvice({ advice }) {
   }
   const enough = by("enough");
   const models = ORDER.map((letter) => advice.models.find((m) => m.model === letter));
-  const text = JSON.stringify(models);
-  if (enough.dataset.shown === text) return;
-  enough.dataset.shown = text;
+  if (shows(enough, models)) return;
   const title = element("h3");
   const ready = models.filter((m) => !m.lacks.length).length;
   title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : `Still needed: ${models[0].lacks.join(" and ")}`;

@@ -1,7 +1,7 @@
 // The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
 import { api } from "./api.js";
-import { button, by, element, setText } from "./elements.js";
+import { button, by, element, setText, shows } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
@@ -226,9 +226,8 @@ function card(detection, i, listed, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : trialPicture();
-  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()]);
-  if (found.dataset.shown === wanted) return;
-  found.dataset.shown = wanted;
+  const wanted = [shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()];
+  if (shows(found, wanted)) return;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));

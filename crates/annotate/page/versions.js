@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
-import { button, by, element } from "./elements.js";
+import { button, by, element, shows } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
 import { changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
@@ -68,8 +68,7 @@ function renderWorse() {
   const text = isShown ? turnedText(now.summary) + worse : "";
   for (const place of document.querySelectorAll(".worse")) {
     place.hidden = !text;
-    if (place.dataset.shown === text) continue;
-    place.dataset.shown = text;
+    if (shows(place, text)) continue;
     place.replaceChildren(text, ...(isLess ? [button(`Use ${number(before.id)} again`, () => use(before.id))] : []));
   }
 }
@@ -130,9 +129,7 @@ export function renderVersions() {
   renderWorse();
   // For the only version, just taught, the result above is enough.
   by("versions").hidden = !models.length || (models.length === 1 && state.teaching.status === "done");
-  const wanted = JSON.stringify([models, chosen, models.map(isOld)]);
-  if (list.dataset.shown === wanted) return;
-  list.dataset.shown = wanted;
+  if (shows(list, [models, chosen, models.map(isOld)])) return;
   list.replaceChildren(...models.map((model) => {
     const item = element("li");
     const grade = gradeOf(model.summary);
