@@ -221,6 +221,23 @@ fn pictures_of_the_folder_are_shown_once_they_are_taken_in() {
     page.assert_quiet();
 }
 
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn an_unreadable_picture_of_the_folder_does_not_stop_those_after_it() {
+    let page = Page::open();
+    let photo = std::fs::read(shipped_photo()).unwrap();
+    for (name, bytes) in [("a.png", &photo[..]), ("b.png", &photo[..200]), ("c.png", &photo[..])] {
+        std::fs::write(page.folder.path().join(name), bytes).unwrap();
+    }
+    page.click("#tab-try");
+    page.browser.run("document.getElementById('add-others').click()", &[]).unwrap();
+    page.wait_for("the list", "return document.querySelectorAll('#folder-list button').length === 3");
+    page.click("#folder-all");
+    page.wait_for("its name", "return document.getElementById('toasts').innerText.includes('b.png')");
+    page.wait_for("the others", "return document.querySelectorAll('#strip button').length === 2");
+    page.wait_for("one left", "return document.getElementById('add-others').innerText === 'From this folder (1)…'");
+}
+
 /// The texts of all elements that a selector names.
 fn texts(page: &Page, css: &str) -> Vec<String> {
     let script = "return [...document.querySelectorAll(arguments[0])].map((e) => e.innerText)";
