@@ -5,7 +5,7 @@
 
 import { api } from "./api.js";
 import { button, by, shows } from "./elements.js";
-import { isFound, isLive, state, trialPicture } from "./store.js";
+import { isFound, isLive, isWaiting, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
@@ -22,7 +22,7 @@ const best = ({ detections }) => detections[0]?.score ?? 0;
 function question() {
   if (state.tab !== "try" || isLive() || !isQuick()) return null;
   const { trialPictures } = state;
-  if (trialPictures.some((trial) => !trial.detections && !trial.failed)) return null;
+  if (trialPictures.some(isWaiting)) return null;
   const refused = trialPictures.filter((t) => t.detections && t.became === null && !t.is_absent && !t.detections.some(isFound));
   const candidates = refused.filter((t) => best(t) >= MIN_LIKE).sort((a, b) => best(b) - best(a)).slice(0, MAX_CANDIDATES);
   if (!candidates.length || refused.length < 2) return null;
