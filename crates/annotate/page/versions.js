@@ -13,8 +13,9 @@ const list = by("version-list");
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
-/** The versions selected for comparison. */
+/** The versions selected for comparison, and those of the last comparison. */
 let chosen = [];
+let compared = null;
 
 /** The results without intervals and errors, for a list of models. */
 function briefFigures({ figures }) {
@@ -88,29 +89,31 @@ async function use(id) {
 }
 
 async function compare() {
-  const [one, other] = chosen;
+  const pair = (compared = chosen);
   const out = by("compared");
   out.textContent = "Looking at all pictures with both…";
   try {
-    const rows = await api.compareModels(one, other);
+    const rows = await api.compareModels(...pair);
+    // Another comparison has begun in the meantime.
+    if (pair !== compared) return;
     if (!rows.length) out.textContent = "There is no picture to try yet: add some in the last step.";
     else {
-      const turns = state.models[Math.max(one, other)].symmetry ?? 1;
+      const turns = state.models[Math.max(...pair)].symmetry ?? 1;
       for (const row of rows) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
-      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows));
+      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows, pair));
     }
   } catch (error) {
-    out.textContent = error.message;
+    if (pair === compared) out.textContent = error.message;
   }
 }
 
-function table(rows) {
+function table(rows, pair) {
   const made = element("table");
   const line = (cells, tag) => {
     const row = made.insertRow();
     for (const cell of cells) row.append(element(tag, { textContent: cell }));
   };
-  line(["Picture", ...chosen.map(number)], "th");
+  line(["Picture", ...pair.map(number)], "th");
   const words = ({ accepted: { length }, best }, there) => {
     const right = there === null ? "" : length > 0 === there ? " ✓" : " ✗";
     return `${length ? `${length} found` : "nothing"}, ${best.toFixed(2)}${right}`;
