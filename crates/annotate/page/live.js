@@ -148,10 +148,11 @@ export function toggleLive() {
 export async function keepPicture() {
   const { live } = state;
   if (state.tab !== "try" || !isLive() || live.number === null) return;
-  const { number, detections, seconds } = live;
+  const { number, detections, failed, seconds } = live;
   try {
     const trial = await api.keepFrame(number);
-    state.trialPictures.push({ ...trial, detections, seconds });
+    // After a failed search, the kept picture is searched again.
+    state.trialPictures.push({ ...trial, detections: failed ? null : detections, seconds });
     toast(`Kept as ${trial.name}`);
   } catch (error) {
     toast(error.message);
