@@ -99,7 +99,7 @@ async function compare() {
     if (!rows.length) out.textContent = "There is no picture to try yet: add some in the last step.";
     else {
       const turns = state.models[Math.max(...pair)].symmetry ?? 1;
-      for (const row of rows) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
+      for (const row of rows) row.change = row.found && changeOf(...row.found.map(({ accepted }) => accepted), turns);
       out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows, pair));
     }
   } catch (error) {
@@ -118,7 +118,11 @@ function table(rows, pair) {
     const right = there === null ? "" : length > 0 === there ? " ✓" : " ✗";
     return `${length ? `${length} found` : "nothing"}, ${best.toFixed(2)}${right}`;
   };
-  for (const { name, found, change, is_there: isThere } of rows) {
+  for (const { name, found, failed, change, is_there: isThere } of rows) {
+    if (!found) {
+      line([name, `not comparable: ${failed}`], "td");
+      continue;
+    }
     // It is not known which of two different grasps is right.
     const differs = DIFFERS[change] ?? "";
     const [one, other] = found.map((each) => words(each, differs ? null : isThere));

@@ -91,6 +91,13 @@ fn models_are_versions_and_marks_that_changed_make_them_stale() {
     assert_eq!((&compared[0]["name"], &compared[0]["is_there"]), (&json!("table.png"), &Value::Null));
     let nothing = json!({"best": 0.0, "accepted": []});
     assert_eq!(compared[0]["found"], json!([nothing, nothing]));
+    // A picture that cannot be searched does not prevent the comparison in the others.
+    try_photo(&served, "cut.png");
+    std::fs::write(served.folder.path().join("tried/cut.png"), &photo_png()[..100]).unwrap();
+    let compared = served.ask("POST", "/api/models/0/compare/1", b"").json();
+    assert_eq!(compared[0]["found"], json!([nothing, nothing]));
+    assert_eq!(compared[1]["found"], Value::Null);
+    assert!(compared[1]["failed"].as_str().unwrap().starts_with("cut.png: "), "{compared}");
 }
 
 #[test]
