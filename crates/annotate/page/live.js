@@ -189,7 +189,7 @@ export function touchText(detection, detections, listed) {
 }
 
 /** A grasp over the table, in words. */
-export function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
+function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
   const [x, y, z] = position_mm.map((v) => v.toFixed(1));
   return `x ${x}, y ${y}, z ${z} mm (±\u00a0${sigma_mm.toFixed(1)}), turned ${yaw_deg.toFixed(1)}° (±\u00a0${sigma_deg.toFixed(1)}), jaws ${opening_mm.toFixed(1)} mm apart; frame: ${frame}`;
 }
@@ -242,8 +242,7 @@ function renderTrying() {
   const told = isAnswered ? cards(live.detections) : [];
   if (shows(by("live-found"), told)) return;
   by("live-found").replaceChildren(...told.map(([title, score, pose, touching]) => {
-    const item = element("div");
-    item.className = "found";
+    const item = element("div", { className: "found" });
     item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p><p class="warning"></p>';
     item.querySelector("span").textContent = title;
     item.querySelector(".score").textContent = score;

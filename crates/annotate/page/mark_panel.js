@@ -152,10 +152,10 @@ function renderAdvice({ advice }) {
   if (!ready || ready === models.length) return enough.replaceChildren(title);
   const items = element("ul");
   for (const { model, lacks } of models) {
-    const item = element("li");
-    item.className = lacks.length ? "" : "ready";
-    item.textContent = lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`;
-    items.append(item);
+    items.append(element("li", {
+      className: lacks.length ? "" : "ready",
+      textContent: lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`,
+    }));
   }
   enough.replaceChildren(title, items);
 }

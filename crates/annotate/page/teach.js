@@ -36,8 +36,7 @@ for (const [value, name, shape] of SHAPES) {
 }
 
 for (const [letter, name, says] of MODELS) {
-  const item = element("label");
-  item.className = "model";
+  const item = element("label", { className: "model" });
   item.innerHTML = `<input type="radio" name="model" value="${letter}"><span><b>${letter}</b> ${name}</span><small></small>`;
   item.lastChild.textContent = says;
   item.firstChild.checked = letter === "C";
@@ -156,11 +155,9 @@ function renderProgress(news) {
   by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
-  by("validations").replaceChildren(...news.validations.map(([step, share]) => {
-    const item = element("li");
-    item.textContent = `After ${step} steps the network alone finds ${percent(share)} of new samples`;
-    return item;
-  }));
+  by("validations").replaceChildren(...news.validations.map(([step, share]) => element("li", {
+    textContent: `After ${step} steps the network alone finds ${percent(share)} of new samples`,
+  })));
 }
 
 function renderOutcome(news) {

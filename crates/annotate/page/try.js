@@ -183,8 +183,7 @@ function text(tag, content, classes = "") {
 
 function card(detection, i, listed, shown) {
   const count = listed.length;
-  const item = element("section");
-  item.className = "found";
+  const item = element("section", { className: "found" });
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
   const isSure = isAccepted(detection);
   const isWrong = shown.is_absent && isFound(detection);
