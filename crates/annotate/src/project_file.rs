@@ -164,8 +164,12 @@ pub struct Gone {
 impl Gone {
     /// Opens a picture. If it cannot be read, a note says why it is left out.
     pub fn open(&mut self, path: &Path, frame: PixelFrame) -> Option<Picture> {
-        let unreadable = |error| self.notes.push(format!("{error}; this picture is left out."));
-        Picture::open(path, frame).map_err(unreadable).ok()
+        Picture::open(path, frame).map_err(|error| self.leave_out(&error)).ok()
+    }
+
+    /// Adds a note that a picture is left out.
+    pub fn leave_out(&mut self, error: &Error) {
+        self.notes.push(format!("{error}; this picture is left out."));
     }
 }
 
@@ -312,7 +316,8 @@ pub fn relative(folder: &Path, path: &Path) -> String {
     inside.to_string_lossy().into_owned()
 }
 
-fn absolute(path: &Path) -> PathBuf {
+/// The absolute path, for comparisons.
+pub fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 

@@ -215,11 +215,12 @@ impl Session {
     /// demonstration again.
     ///
     /// # Errors
-    /// Unknown picture, or the project cannot be written.
+    /// Unknown picture, its marks' file belongs to another photo now, or the project cannot be written.
     pub fn put_back_image(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         let count = state.images.len();
-        state.images.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
+        state.images.get(id).ok_or(Error::NoSuchPicture { id, count })?.check_file(state.photos())?;
+        state.images[id].is_removed = false;
         state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|t| t.is_absent = false);
         state.save_project()
     }

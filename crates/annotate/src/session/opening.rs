@@ -20,9 +20,10 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture, another
-    /// file in the place of a project's, or a photo of a calibrated camera that an Exif orientation rotates. Unreadable
-    /// pictures of the project or of a folder are left out; the notes for the user name them.
+    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture or are in
+    /// the file of another photo, another file in the place of a project's, or a photo of a calibrated camera that an
+    /// Exif orientation rotates. Unreadable pictures of the project or of a folder, and photos of the project whose
+    /// marks are in the file of another one, are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -57,6 +58,14 @@ impl Session {
                 continue;
             };
             let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
+            if let Err(error) = image.check_file(images.iter()) {
+                if is_given {
+                    return Err(error);
+                }
+                gone.leave_out(&error);
+                gone.photos.push(relative(&folder, path));
+                continue;
+            }
             label = label.take().or(named);
             images.push(image);
         }

@@ -192,8 +192,8 @@ impl Session {
     /// copied beside the first picture under an unused name: no marks are written into other folders.
     ///
     /// # Errors
-    /// Unknown picture, the picture is a demonstration already, an Exif orientation rotates a picture of a calibrated
-    /// camera, or a file cannot be written.
+    /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
+    /// orientation rotates a picture of a calibrated camera, or a file cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
