@@ -15,6 +15,17 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The name of a path in a project's file: relative to the folder if it is inside.
+pub fn relative(folder: &Path, path: &Path) -> String {
+    let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
+    inside.to_string_lossy().into_owned()
+}
+
+/// The absolute path, for comparisons.
+pub fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
 /// The natural order of two names, the same as on the page: numbers by value (2 before 10), letters without regard to
 /// case.
 pub fn natural_order(a: &str, b: &str) -> Ordering {

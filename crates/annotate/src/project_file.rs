@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
-use crate::names::PROJECT_FILE;
+use crate::names::{PROJECT_FILE, absolute, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::region::Region;
 
@@ -308,17 +308,6 @@ impl ProjectFile {
             .map_err(|error| Error::Project { path: path.clone(), found: error.to_string() })?;
         Ok(write_atomically(path, &text)?)
     }
-}
-
-/// The name of a path in the file: relative to the folder if it is inside.
-pub fn relative(folder: &Path, path: &Path) -> String {
-    let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
-    inside.to_string_lossy().into_owned()
-}
-
-/// The absolute path, for comparisons.
-pub fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 #[cfg(test)]

@@ -11,9 +11,9 @@ use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
-use crate::names::file_name;
+use crate::names::{absolute, file_name, relative};
 use crate::picture::Picture;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried, absolute, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried};
 use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 

@@ -70,7 +70,7 @@ pub struct TrialPictureView {
 pub struct ModelView {
     /// Its index in the session.
     pub id: usize,
-    /// Its file's name.
+    /// Its file's name, or the path of a file outside the project's folder of versions.
     pub file: String,
     /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,

@@ -115,6 +115,27 @@ fn a_model_is_not_old_because_its_folder_was_renamed() {
 }
 
 #[test]
+fn a_model_in_another_folder_is_found_without_naming_that_again() {
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().join("rod.sdg");
+    let in_use = |served: &Served| {
+        let models = get(served)["models"].clone();
+        models.as_array().unwrap().iter().map(|model| model["is_current"] == true).collect::<Vec<_>>()
+    };
+    let served = Served::of_project_with_model(project().end(), path.clone());
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    assert_eq!(std::fs::read_dir(out.path().join("models")).unwrap().count(), 1);
+    let served = Served::of_project(served.end());
+    assert_eq!(in_use(&served), [true]);
+    // A model in the project's folder is also found if another folder is given.
+    teach(&served);
+    let served = Served::of_project_with_model(served.end(), path);
+    assert_eq!(in_use(&served), [false, true]);
+    assert_eq!(served.ask("PUT", "/api/models/0/current", b"").status, 200);
+}
+
+#[test]
 fn a_version_keeps_the_settings_of_the_part() {
     let served = project();
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();

@@ -8,10 +8,10 @@ use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
 use crate::model_versions::ModelVersions;
-use crate::names::{free_numbered, proposed_label};
+use crate::names::{absolute, free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -78,8 +78,12 @@ impl Session {
                 Some(made.map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?)
             }
         };
+        let default_folder = home.with_file_name("models");
+        let folder_of_out = options.model_path.as_ref().map(|path| path.with_file_name("models"));
+        let other_folder = folder_of_out.filter(|folder| absolute(folder) != absolute(&default_folder));
         let models = ModelVersions {
-            folder: options.model_path.as_ref().unwrap_or(&home).with_file_name("models"),
+            folder: other_folder.unwrap_or_else(|| default_folder.clone()),
+            default_folder,
             versions: project.models,
             current: project.current_model,
         };

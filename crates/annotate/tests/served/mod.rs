@@ -224,6 +224,13 @@ impl Served {
         Self::open(folder, options, PATIENCE)
     }
 
+    /// Like [`Self::of_project`], with a file for the model.
+    pub fn of_project_with_model(folder: tempfile::TempDir, model_path: PathBuf) -> Self {
+        let (project, model_path) = (Some(folder.path().to_owned()), Some(model_path));
+        let options = SessionOptions { project, model_path, ..SessionOptions::default() };
+        Self::open(folder, options, PATIENCE)
+    }
+
     /// Like [`Self::of_project`], with a calibrated camera.
     pub fn of_calibrated_project(folder: tempfile::TempDir) -> Self {
         let project = Some(folder.path().to_owned());
