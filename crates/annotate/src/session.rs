@@ -96,7 +96,7 @@ pub struct Session {
     /// Folder for pictures added on the page before there is a photo.
     temporary: Option<TempDir>,
     /// Locks that keep other programs from writing the same files.
-    locks: Vec<WriterLock>,
+    locks: Mutex<Vec<WriterLock>>,
     state: Arc<Mutex<State>>,
     id: String,
     token: Option<String>,
@@ -114,10 +114,20 @@ impl Session {
         &self.id
     }
 
-    /// Keeps locks for the lifetime of the session.
-    pub fn holding(mut self, locks: Vec<WriterLock>) -> Self {
-        self.locks.extend(locks);
+    /// Keeps locks for the lifetime of the session, or until the project is closed.
+    pub fn holding(self, locks: Vec<WriterLock>) -> Self {
+        self.locks().extend(locks);
         self
+    }
+
+    fn locks(&self) -> MutexGuard<'_, Vec<WriterLock>> {
+        self.locks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Releases the locks when the project is closed: the session may remain in use by a running search, and the same
+    /// project can be opened again at once.
+    pub(crate) fn release_locks(&self) {
+        self.locks().clear();
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

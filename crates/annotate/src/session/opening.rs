@@ -142,7 +142,7 @@ impl Session {
             live: options.live.clone().map(LiveDesk::new),
             taken_names: taken_names.unwrap_or_default(),
             temporary,
-            locks: Vec::new(),
+            locks: Mutex::default(),
             state: Arc::new(Mutex::new(state)),
             id: new_token()?,
             token: options.token.clone(),
