@@ -14,6 +14,15 @@ export function adopt(view) {
   return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
 }
 
+/** Replaces marks by those that another page has changed, as an undoable step. Marks that are being changed here stay. */
+export function adoptChange(target, { marks, advice, saved }) {
+  if (textOf(marks) === textOf(JSON.parse(target.sent)) || JSON.stringify(target.marks) !== target.committed) return;
+  const sent = JSON.stringify(marks);
+  target.past.push([target.committed, target.found]);
+  Object.assign(target, { marks, advice, saved, sent, committed: sent, future: [], found: null, waiting: [], revision: target.revision + 1 });
+  if (target === image()) Object.assign(state, { draft: null, vertex: null });
+}
+
 /** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
 export function commit(found = null) {
   const target = image();
@@ -127,6 +136,11 @@ export function closeOutline(points) {
 
 const boxOf = ({ marks: { box, outline } }) => box ?? (outline && boundsOf(outline));
 const keyOf = ({ marks: { outline } }) => JSON.stringify(outline);
+/** Marks as a text for comparisons, the same after they were written to a file and read again: the file has a box for every outline, no grasp without them, and other last digits. */
+export function textOf(marks) {
+  const box = boxOf({ marks });
+  return box && JSON.stringify([box, marks.outline, marks.grasp], round);
+}
 
 /** How a photo's outline was found: the outline that strokes corrected (null: detected in the box), the strokes, and the box within which they apply. An outline that was drawn, changed by hand or loaded is itself the one to correct. */
 const howFound = (target) => (target.found?.outline === keyOf(target) ? target.found : { base: target.marks.outline, strokes: [], box: null });

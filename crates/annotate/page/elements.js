@@ -2,6 +2,21 @@
 
 export const by = (id) => document.getElementById(id);
 
+export const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Sets a text only if it differs: screen readers announce every text that is set. */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Whether an element shows this content already; if not, the caller shows it now. */
+export function shows(element, content) {
+  const key = JSON.stringify(content);
+  if (element.dataset.shown === key) return true;
+  element.dataset.shown = key;
+  return false;
+}
+
 /** A new element with these fields. */
 export const element = (tag, fields) => Object.assign(document.createElement(tag), fields);
 

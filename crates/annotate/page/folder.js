@@ -7,7 +7,7 @@ import { changed, isLive, state } from "./store.js";
 import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
-import { byName } from "./words.js";
+import { byName, listText } from "./words.js";
 
 const dialog = by("folder");
 /** Role of a chosen picture: photo or try. */
@@ -32,12 +32,9 @@ function took(view) {
 
 /** Runs an operation that adds pictures and reports its errors. */
 async function take(work) {
-  try {
-    await work();
-    await refresh();
-  } catch (error) {
-    toast(error.message);
-  }
+  await work().catch((error) => toast(error.message));
+  // If the server is gone, a banner says so.
+  await refresh().catch(() => null);
   render();
   changed();
 }
@@ -47,14 +44,17 @@ const takePhoto = (id) => take(async () => {
   dialog.close();
 });
 
-/** Adds pictures to try, and shows the first of them. */
+/** Adds pictures to try, without those that cannot be read, and shows the first of them. */
 const takeTrials = (ids) => take(async () => {
   const first = state.trialPictures.length;
-  try {
-    for (const id of ids) state.trialPictures.push({ ...(await api.addOtherTrial(id)), detections: null });
-  } finally {
-    openTrialPicture(first);
+  const errors = [];
+  for (const id of ids) {
+    const trial = await api.addOtherTrial(id).catch((error) => void errors.push(error));
+    if (trial) state.trialPictures.push({ ...trial, detections: null });
+    if (errors.at(-1)?.lost) break;
   }
+  openTrialPicture(first);
+  if (errors.length) toast(listText(errors.map(({ message }) => message), 3));
 });
 
 /** A photo from elsewhere is copied beside the first photo. */

@@ -4,8 +4,8 @@
 // done with model S only, which is taught in a second. Only the user knows whether the part is where it was refused.
 
 import { api } from "./api.js";
-import { button, by } from "./elements.js";
-import { isFound, isLive, state, trialPicture } from "./store.js";
+import { button, by, shows } from "./elements.js";
+import { isFound, isLive, isWaiting, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
@@ -22,7 +22,7 @@ const best = ({ detections }) => detections[0]?.score ?? 0;
 function question() {
   if (state.tab !== "try" || isLive() || !isQuick()) return null;
   const { trialPictures } = state;
-  if (trialPictures.some((trial) => !trial.detections && !trial.failed)) return null;
+  if (trialPictures.some(isWaiting)) return null;
   const refused = trialPictures.filter((t) => t.detections && t.became === null && !t.is_absent && !t.detections.some(isFound));
   const candidates = refused.filter((t) => best(t) >= MIN_LIKE).sort((a, b) => best(b) - best(a)).slice(0, MAX_CANDIDATES);
   if (!candidates.length || refused.length < 2) return null;
@@ -73,9 +73,7 @@ export function renderHelps() {
   const helps = by("helps");
   helps.hidden = !text;
   const isElsewhere = Boolean(candidate) && candidate !== trialPicture();
-  const wanted = `${text}${isElsewhere}`;
-  if (helps.dataset.shown === wanted) return;
-  helps.dataset.shown = wanted;
+  if (shows(helps, [text, isElsewhere])) return;
   helps.replaceChildren(text);
   if (isElsewhere) helps.append(" ", button("Look at it", () => openTrialPicture(state.trialPictures.indexOf(candidate)), "plain"));
 }

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
-import { by, element, offBecause } from "./elements.js";
+import { by, element, offBecause, setText, shows, wait } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
@@ -31,7 +31,6 @@ const FAULTS = {
   lost: "No answer",
 };
 
-const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const isPaused = () => state.tab === "try" && state.live.paused;
 
 /** Requests the newest frame as long as the live picture is shown. */
@@ -149,10 +148,11 @@ export function toggleLive() {
 export async function keepPicture() {
   const { live } = state;
   if (state.tab !== "try" || !isLive() || live.number === null) return;
-  const { number, detections, seconds } = live;
+  const { number, detections, failed, seconds } = live;
   try {
     const trial = await api.keepFrame(number);
-    state.trialPictures.push({ ...trial, detections, seconds });
+    // After a failed search, the kept picture is searched again.
+    state.trialPictures.push({ ...trial, detections: failed ? null : detections, seconds });
     toast(`Kept as ${trial.name}`);
   } catch (error) {
     toast(error.message);
@@ -165,10 +165,6 @@ by("back-to-photos").addEventListener("click", toggleCamera);
 by("camera-button").addEventListener("click", toggleCamera);
 by("live-toggle").addEventListener("click", toggleLive);
 by("live-keep").addEventListener("click", keepPicture);
-
-function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
-}
 
 /** A grasp's position in words: in pixels of the picture, and over the table if the camera is calibrated. */
 export function placeText({ marks, pose }) {
@@ -193,7 +189,7 @@ export function touchText(detection, detections, listed) {
 }
 
 /** A grasp over the table, in words. */
-export function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
+function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
   const [x, y, z] = position_mm.map((v) => v.toFixed(1));
   return `x ${x}, y ${y}, z ${z} mm (±\u00a0${sigma_mm.toFixed(1)}), turned ${yaw_deg.toFixed(1)}° (±\u00a0${sigma_deg.toFixed(1)}), jaws ${opening_mm.toFixed(1)} mm apart; frame: ${frame}`;
 }
@@ -244,12 +240,9 @@ function renderTrying() {
   const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : `${isRunning() ? "A model is being taught" : "Teach a model first"}: it then looks for the part here.`;
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
-  const text = JSON.stringify(told);
-  if (by("live-found").dataset.shown === text) return;
-  by("live-found").dataset.shown = text;
+  if (shows(by("live-found"), told)) return;
   by("live-found").replaceChildren(...told.map(([title, score, pose, touching]) => {
-    const item = element("div");
-    item.className = "found";
+    const item = element("div", { className: "found" });
     item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p><p class="warning"></p>';
     item.querySelector("span").textContent = title;
     item.querySelector(".score").textContent = score;

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
-import { button, by, element, offBecause } from "./elements.js";
+import { button, by, element, offBecause, setText, shows } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
 import { removePhoto } from "./strip.js";
@@ -84,7 +84,7 @@ function renderSaved({ saved }) {
     nothing: () => (marks().grasp ? "Kept here; saved as soon as there is a box" : "Nothing marked yet"),
     refused: () => `Not saved: ${saved.why}`,
   }[saved.state]();
-  if (line.textContent !== text) line.textContent = text;
+  setText(line, text);
   line.className = `saved ${saved.state}`;
 }
 
@@ -129,9 +129,7 @@ function fix(remedy) {
 
 function renderAdvice({ advice }) {
   const list = by("remarks");
-  const remarks = JSON.stringify(advice.remarks);
-  if (list.dataset.shown !== remarks) {
-    list.dataset.shown = remarks;
+  if (!shows(list, advice.remarks)) {
     list.replaceChildren(...advice.remarks.map((remark) => {
       const item = element("li");
       item.dataset.code = remark.code;
@@ -147,19 +145,17 @@ function renderAdvice({ advice }) {
   }
   const enough = by("enough");
   const models = ORDER.map((letter) => advice.models.find((m) => m.model === letter));
-  const text = JSON.stringify(models);
-  if (enough.dataset.shown === text) return;
-  enough.dataset.shown = text;
+  if (shows(enough, models)) return;
   const title = element("h3");
   const ready = models.filter((m) => !m.lacks.length).length;
   title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : `Still needed: ${models[0].lacks.join(" and ")}`;
   if (!ready || ready === models.length) return enough.replaceChildren(title);
   const items = element("ul");
   for (const { model, lacks } of models) {
-    const item = element("li");
-    item.className = lacks.length ? "" : "ready";
-    item.textContent = lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`;
-    items.append(item);
+    items.append(element("li", {
+      className: lacks.length ? "" : "ready",
+      textContent: lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`,
+    }));
   }
   enough.replaceChildren(title, items);
 }
@@ -204,6 +200,5 @@ function renderTools() {
   offBecause(by("delete"), !(state.draft || (state.selected && image()?.marks[state.selected])) && "Select a mark first");
   by("mark-tools").hidden = by("edit-tools").hidden = by("in-out").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
-  const text = marking ? hint() : "";
-  if (by("hint").textContent !== text) by("hint").textContent = text;
+  setText(by("hint"), marking ? hint() : "");
 }

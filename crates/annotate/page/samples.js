@@ -1,7 +1,7 @@
 // The second step: a sheet of samples made from the marks.
 
 import { api } from "./api.js";
-import { by, element, offBecause } from "./elements.js";
+import { by, element, offBecause, shows } from "./elements.js";
 import { image, isAnyMarked, state } from "./store.js";
 
 const COUNT = 12;
@@ -26,9 +26,7 @@ export function renderSamples() {
     return sheet.replaceChildren();
   }
   const { id, marks, committed } = image();
-  const wanted = `${id} ${first} ${committed}`;
-  if (sheet.dataset.shown === wanted) return;
-  sheet.dataset.shown = wanted;
+  if (shows(sheet, [id, first, committed])) return;
   problem.hidden = Boolean(marks.box || marks.outline);
   if (!problem.hidden) {
     problem.textContent = "There is nothing to show yet: draw a box around the part first.";

@@ -2,10 +2,11 @@
 // back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
-import { adopt, save } from "./editing.js";
-import { by, stored } from "./elements.js";
+import { adopt, adoptChange, save, textOf } from "./editing.js";
+import { by, stored, wait } from "./elements.js";
 import { changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
+import { follow } from "./teach.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
 
@@ -99,7 +100,7 @@ export async function sendKept() {
   for (const [name, { was, marks }] of Object.entries(JSON.parse(text))) {
     const target = state.images.find((image) => image.name === name);
     // Marks changed elsewhere since then are not overwritten.
-    if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
+    if (!target || textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
     target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
     sent.push(save(target).then(() => target.saved.state === "written"));
@@ -109,6 +110,20 @@ export async function sendKept() {
 }
 
 window.addEventListener("pagehide", () => keep());
+
+/** Adopts marks that another page of the session has changed; the next change here would write over them. */
+async function adoptChanges() {
+  if (isLost() || document.hidden) return;
+  const before = state.images.map((target) => [target, target.revision]);
+  // If the server is gone, a banner says so.
+  const session = await api.session().catch(() => null);
+  for (const [target, revision] of before) {
+    const view = session?.images.find(({ id }) => id === target.id);
+    if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
+  }
+  changed();
+}
+for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);
 
 /** A banner shown as long as marks could not be written. */
 export function renderUnsaved() {
@@ -126,14 +141,14 @@ export function renderUnsaved() {
 /** Checks repeatedly whether the server answers. */
 export async function beat() {
   for (;;) {
-    await new Promise((resolve) => setTimeout(resolve, isLost() ? RETRY_MS : BEAT_MS));
+    await wait(isLost() ? RETRY_MS : BEAT_MS);
     if (isLost()) {
       keep();
       await meetAgain();
     } else {
       if (!state.images.some(isUnsaved)) stored(keptKey(), null);
       state.images.filter(({ saved }) => saved.by_disk).forEach(save);
-      if (!document.hidden) await api.teaching().catch(() => null);
+      if (!document.hidden) await api.teaching().then(follow, () => null);
     }
   }
 }

@@ -70,6 +70,8 @@ export const trialPicture = () => state.trialPictures[state.trial];
 /** Whether a photo has all the marks that a teaching needs. */
 export const isComplete = ({ marks: { box, outline, grasp } }) => Boolean((box || outline) && grasp);
 export const isAnyMarked = () => state.images.some(isComplete);
+/** Whether a picture to try was not searched yet. */
+export const isWaiting = (trial) => !trial.detections && !trial.failed;
 /** From this score on the model itself accepts a detection. */
 export const MODEL_LIMIT = 0.5;
 /** Whether a detection reaches the chosen minimum score. */

@@ -1,7 +1,7 @@
 // The four steps, as tabs.
 
 import { api } from "./api.js";
-import { by } from "./elements.js";
+import { by, wait } from "./elements.js";
 import { isMarked, showCurrent } from "./strip.js";
 import { changed, isLive, state } from "./store.js";
 
@@ -23,7 +23,7 @@ export function openTab(name) {
 async function refreshVersions() {
   try {
     // Marks that are being sent come first.
-    while (state.images.some((photo) => photo.saving)) await new Promise((resolve) => setTimeout(resolve, 50));
+    while (state.images.some((photo) => photo.saving)) await wait(50);
     state.models = (await api.session()).models;
     changed();
   } catch {

@@ -1,13 +1,13 @@
 // The third step: teaching, and its progress.
 
 import { api } from "./api.js";
-import { by, element, offBecause } from "./elements.js";
+import { by, element, offBecause, setText, wait } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
 import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
-import { percent, seconds } from "./words.js";
+import { listText, percent, seconds } from "./words.js";
 
 const POLL_MS = 400;
 const MODELS = [
@@ -36,8 +36,7 @@ for (const [value, name, shape] of SHAPES) {
 }
 
 for (const [letter, name, says] of MODELS) {
-  const item = element("label");
-  item.className = "model";
+  const item = element("label", { className: "model" });
   item.innerHTML = `<input type="radio" name="model" value="${letter}"><span><b>${letter}</b> ${name}</span><small></small>`;
   item.lastChild.textContent = says;
   item.firstChild.checked = letter === "C";
@@ -91,19 +90,27 @@ by("teach-stop").addEventListener("click", async () => {
 /** Requests progress until the teaching has ended. */
 export async function watch() {
   while (isRunning()) {
-    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    await wait(POLL_MS);
     try {
       const news = await api.teaching();
       const isDone = news.status === "done";
       // Nothing is shown between the end of the teaching and its model: results of the model before would be taken for the new one's.
       const models = isDone ? (await api.session().catch(() => state)).models : state.models;
+      // Another call of this function may have been faster.
+      if (isDone && isRunning()) searchAgain({ compares: true });
       Object.assign(state, { teaching: news, models });
-      if (isDone) searchAgain({ compares: true });
     } catch (error) {
       if (!error.lost) toast(error.message);
     }
     changed();
   }
+}
+
+/** Follows a teaching that another page has started, or adopts its end. */
+export function follow(news) {
+  if (isRunning() || news.elapsed_secs === state.teaching.elapsed_secs || !/running|done/.test(news.status)) return;
+  state.teaching = { ...news, status: "running" };
+  watch();
 }
 
 /** What a model is or was taught from, in words. */
@@ -148,11 +155,9 @@ function renderProgress(news) {
   by("teach-stop").textContent = keeps ? "Stop and keep the result so far" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
-  by("validations").replaceChildren(...news.validations.map(([step, share]) => {
-    const item = element("li");
-    item.textContent = `After ${step} steps the network alone finds ${percent(share)} of new samples`;
-    return item;
-  }));
+  by("validations").replaceChildren(...news.validations.map(([step, share]) => element("li", {
+    textContent: `After ${step} steps the network alone finds ${percent(share)} of new samples`,
+  })));
 }
 
 function renderOutcome(news) {
@@ -165,14 +170,13 @@ function renderOutcome(news) {
     const better = grade === "good" ? "" : " Your own pictures teach it better.";
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
-  if (outcome.textContent !== text) outcome.textContent = text;
+  setText(outcome, text);
   by("teach-error").hidden = news.status !== "failed";
   by("teach-error").textContent = news.error ?? "";
   const hasChanged = news.status === "done" && isOld(state.models.at(-1));
   outcome.classList.toggle("outdated", hasChanged);
   by("teach-old").hidden = !hasChanged;
-  const old = hasChanged ? `This result is old: ${OLD}. Teach again.` : "";
-  if (by("teach-old").textContent !== old) by("teach-old").textContent = old;
+  setText(by("teach-old"), hasChanged ? `This result is old: ${OLD}. Teach again.` : "");
   by("go-try").hidden = news.status !== "done";
   by("go-try").classList.toggle("primary", !hasChanged);
   by("teach-start").classList.toggle("primary", news.status !== "done" || hasChanged);
@@ -224,7 +228,7 @@ export function renderTeach() {
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
-    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${new Intl.ListFormat("en").format(lacks)}`;
+    const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${listText(lacks)}`;
     offBecause(input, reason);
     input.closest("label").title = reason || "";
     if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;

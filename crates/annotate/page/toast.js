@@ -8,8 +8,7 @@ const SHOWN_WITH_BUTTON_MS = 12000;
 
 /** Shows `text` for some seconds; with `action`, a `{ text, run }`, a button beside it. */
 export function toast(text, action = null) {
-  const note = element("p");
-  note.textContent = text;
+  const note = element("p", { textContent: text });
   by("toasts").append(note);
   const act = () => {
     note.remove();

@@ -1,7 +1,7 @@
 // The fourth step: the taught model on other pictures. Confirmed or corrected detections become demonstrations.
 
-import { api } from "./api.js";
-import { button, by, element } from "./elements.js";
+import { api, present } from "./api.js";
+import { button, by, element, setText, shows } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
 import { adopt } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
@@ -12,7 +12,7 @@ import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
 import { isOld, OLD } from "./part_settings.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
-import { changed, isAccepted, isFound, isLive, isRunning, MODEL_LIMIT, state, trialPicture } from "./store.js";
+import { changed, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { isQuick, progressText, teach } from "./teach.js";
 import { toast } from "./toast.js";
@@ -100,17 +100,17 @@ async function lookAtAll() {
   if (looking || !isTaught()) return;
   looking = true;
   for (;;) {
-    const waiting = (s) => s && !s.detections && !s.failed;
-    const next = waiting(trialPicture()) ? trialPicture() : state.trialPictures.find(waiting);
+    const next = [trialPicture(), ...state.trialPictures].find((trial) => trial && isWaiting(trial));
     if (!next || state.tab !== "try") break;
     const { generation } = state;
     next.detecting = true;
     changed();
-    const answer = await api.detect(next.id).catch((error) => ({ failed: error.message }));
-    // After a change of the model or the region in the meantime, this picture is searched again.
+    const answer = await api.detect(next.id).catch((error) => (error.lost ? {} : { failed: error.message }));
+    // After a change of the model or the region in the meantime, or without a server, this picture is searched again.
     if (generation === state.generation) Object.assign(next, answer);
     next.detecting = false;
     changed();
+    await present();
   }
   looking = false;
 }
@@ -150,7 +150,7 @@ function renderLearnt() {
   }
   by("learnt").hidden = !text;
   by("learnt").className = isGood ? "learnt" : "warning";
-  if (by("learnt").textContent !== text) by("learnt").textContent = text;
+  setText(by("learnt"), text);
 }
 
 by("save-csv").addEventListener("click", () => exportPictures("csv"));
@@ -183,8 +183,7 @@ function text(tag, content, classes = "") {
 
 function card(detection, i, listed, shown) {
   const count = listed.length;
-  const item = element("section");
-  item.className = "found";
+  const item = element("section", { className: "found" });
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
   const isSure = isAccepted(detection);
   const isWrong = shown.is_absent && isFound(detection);
@@ -226,9 +225,8 @@ function card(detection, i, listed, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : trialPicture();
-  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()]);
-  if (found.dataset.shown === wanted) return;
-  found.dataset.shown = wanted;
+  const wanted = [shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()];
+  if (shows(found, wanted)) return;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));
@@ -290,13 +288,13 @@ function renderJudge() {
   const beyond = state.minScore === MODEL_LIMIT ? "" : ` For “sdg detect”: --min-score ${least}${ofLive}.`;
   const all = state.trialPictures.length;
   const counted = `${isLow ? `Above ${least}:` : "Found"} ${above} of ${places.length} candidates${isLow ? "" : ` at ${least}`}, in ${inPictures} of ${looked.length} pictures`;
-  const waiting = looked.length < all ? ` (${all - looked.length} are still looked at)` : "";
+  const left = state.trialPictures.filter(isWaiting).length;
+  const waiting = left ? ` (${left} are still looked at)` : "";
   const low = isLow ? ` ${sure} of them reach${sure === 1 ? "es" : ""} the model’s limit of ${MODEL_LIMIT.toFixed(2)}; those below it are often wrong.` : "";
-  const words = looked.length ? `${counted}${waiting}.${low}${beyond}` : beyond.trim();
   by("least-score-count").classList.toggle("warning", isLow);
-  if (by("least-score-count").textContent !== words) by("least-score-count").textContent = words;
-  by("looked").hidden = looked.length === all || all < 2;
-  Object.assign(by("looked"), { max: Math.max(all, 1), value: looked.length });
+  setText(by("least-score-count"), looked.length ? `${counted}${waiting}.${low}${beyond}` : beyond.trim());
+  by("looked").hidden = !left || all < 2;
+  Object.assign(by("looked"), { max: Math.max(all, 1), value: all - left });
   by("export").hidden = !looked.length;
   by("sort-choice").hidden = all < MIN_SORTED;
   const differs = ({ refusal }) => refusal && (refusal.edges.length || refusal.surface.length);

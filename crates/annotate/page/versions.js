@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
-import { button, by, element } from "./elements.js";
+import { button, by, element, shows } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
 import { changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
@@ -13,8 +13,9 @@ const list = by("version-list");
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
-/** The versions selected for comparison. */
+/** The versions selected for comparison, and those of the last comparison. */
 let chosen = [];
+let compared = null;
 
 /** The results without intervals and errors, for a list of models. */
 function briefFigures({ figures }) {
@@ -68,8 +69,7 @@ function renderWorse() {
   const text = isShown ? turnedText(now.summary) + worse : "";
   for (const place of document.querySelectorAll(".worse")) {
     place.hidden = !text;
-    if (place.dataset.shown === text) continue;
-    place.dataset.shown = text;
+    if (shows(place, text)) continue;
     place.replaceChildren(text, ...(isLess ? [button(`Use ${number(before.id)} again`, () => use(before.id))] : []));
   }
 }
@@ -89,34 +89,40 @@ async function use(id) {
 }
 
 async function compare() {
-  const [one, other] = chosen;
+  const pair = (compared = chosen);
   const out = by("compared");
   out.textContent = "Looking at all pictures with both…";
   try {
-    const rows = await api.compareModels(one, other);
+    const rows = await api.compareModels(...pair);
+    // Another comparison has begun in the meantime.
+    if (pair !== compared) return;
     if (!rows.length) out.textContent = "There is no picture to try yet: add some in the last step.";
     else {
-      const turns = state.models[Math.max(one, other)].symmetry ?? 1;
-      for (const row of rows) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
-      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows));
+      const turns = state.models[Math.max(...pair)].symmetry ?? 1;
+      for (const row of rows) row.change = row.found && changeOf(...row.found.map(({ accepted }) => accepted), turns);
+      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows, pair));
     }
   } catch (error) {
-    out.textContent = error.message;
+    if (pair === compared) out.textContent = error.message;
   }
 }
 
-function table(rows) {
+function table(rows, pair) {
   const made = element("table");
   const line = (cells, tag) => {
     const row = made.insertRow();
     for (const cell of cells) row.append(element(tag, { textContent: cell }));
   };
-  line(["Picture", ...chosen.map(number)], "th");
+  line(["Picture", ...pair.map(number)], "th");
   const words = ({ accepted: { length }, best }, there) => {
     const right = there === null ? "" : length > 0 === there ? " ✓" : " ✗";
     return `${length ? `${length} found` : "nothing"}, ${best.toFixed(2)}${right}`;
   };
-  for (const { name, found, change, is_there: isThere } of rows) {
+  for (const { name, found, failed, change, is_there: isThere } of rows) {
+    if (!found) {
+      line([name, `not comparable: ${failed}`], "td");
+      continue;
+    }
     // It is not known which of two different grasps is right.
     const differs = DIFFERS[change] ?? "";
     const [one, other] = found.map((each) => words(each, differs ? null : isThere));
@@ -130,9 +136,7 @@ export function renderVersions() {
   renderWorse();
   // For the only version, just taught, the result above is enough.
   by("versions").hidden = !models.length || (models.length === 1 && state.teaching.status === "done");
-  const wanted = JSON.stringify([models, chosen, models.map(isOld)]);
-  if (list.dataset.shown === wanted) return;
-  list.dataset.shown = wanted;
+  if (shows(list, [models, chosen, models.map(isOld)])) return;
   list.replaceChildren(...models.map((model) => {
     const item = element("li");
     const grade = gradeOf(model.summary);

@@ -145,6 +145,7 @@ impl Desk {
         let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(session) = &*session {
             session.check_idle()?;
+            session.release_locks();
         }
         *session = None;
         drop(session);
@@ -173,5 +174,66 @@ impl Start {
             recent: recent.collect(),
             folder: shown(if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use image::RgbImage;
+    use sdg_demonstration::Demonstration;
+    use sdg_files::WriterLock;
+
+    use super::*;
+    use crate::picture::png;
+    use crate::region::Region;
+    use crate::session::SessionOptions;
+    use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingMaterial, TeachingStep};
+
+    type Taught = std::result::Result<Box<dyn TaughtModel>, TeacherError>;
+
+    struct NoTeacher;
+
+    impl GraspTeacher for NoTeacher {
+        fn teach(
+            &self,
+            _: &TeachingMaterial,
+            _: &TeachRequest,
+            _: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
+        ) -> Taught {
+            Err("no teacher".into())
+        }
+
+        fn teach_on_trial(&self, _: &TeachingMaterial, _: &TeachRequest) -> Taught {
+            Err("no teacher".into())
+        }
+
+        fn check_region(&self, _: &Region, _: &[Demonstration]) -> std::result::Result<(), TeacherError> {
+            Ok(())
+        }
+
+        fn open(&self, _: &[u8], _: &TaughtSummary) -> Taught {
+            Err("no teacher".into())
+        }
+    }
+
+    #[test]
+    fn a_closed_project_is_unlocked_although_a_search_still_uses_it() {
+        let lock = |project: &Path| WriterLock::take(&project.join("sdg-project.json"));
+        let open = move |path: &Path| {
+            let options = SessionOptions { project: Some(path.to_owned()), ..SessionOptions::default() };
+            Ok(Session::open(&options, Arc::new(NoTeacher))?.holding(lock(path)?.into_iter().collect()))
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let (project, pixel_frame) = (folder.path().join("rod"), PixelFrame::Upright);
+        let start = Start { recent: None, folder: folder.path().to_owned(), pixel_frame, open: Box::new(open) };
+        let desk = Desk::of_start(start);
+        desk.create("rod", "photo.png", &png(&RgbImage::new(60, 40)).unwrap()).unwrap();
+        let search = desk.session();
+        assert!(lock(&project).is_err());
+        desk.close().unwrap();
+        assert!(lock(&project).unwrap().is_some());
+        drop(search);
     }
 }

@@ -38,6 +38,9 @@ pub enum Error {
     /// Marks needed for the request are missing.
     #[error("{name}: expected {expected}, found {found}")]
     NotMarked { name: String, expected: &'static str, found: &'static str },
+    /// Another photo has its marks in the same file.
+    #[error("{name}: expected a file of its own for the marks, found {}, the file of {other}", path.display())]
+    SharedMarks { name: String, path: PathBuf, other: String },
     /// No picture of that number.
     #[error("expected a picture numbered below {count}, found {id}")]
     NoSuchPicture { id: usize, count: usize },

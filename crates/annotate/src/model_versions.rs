@@ -6,6 +6,9 @@
 //! models/pendulum-C-20261123-203107.sdg  a teaching's file
 //! models/pendulum-20261120-081500.sdg    the former pendulum.sdg, if no teaching here made it
 //! ```
+//!
+//! If the user gives a file in another folder for the model, `models/` is there, too. A version is only read and copied,
+//! never changed or deleted, so a path in a project's file from elsewhere does no harm.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +18,7 @@ use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::names::{file_name, free_numbered};
+use crate::names::{free_numbered, relative};
 use crate::teacher::TaughtSummary;
 
 /// Maximum size of a model file.
@@ -24,7 +27,7 @@ const MAX_MODEL_BYTES: u64 = 1 << 30;
 /// The model of one teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Version {
-    /// File name in the folder of versions.
+    /// File name in the project's folder of versions; the absolute path of a file elsewhere.
     pub file: String,
     /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,
@@ -46,7 +49,10 @@ pub struct Version {
 /// All versions, oldest first.
 #[derive(Debug, Clone, Default)]
 pub struct ModelVersions {
+    /// Folder for new versions, beside the model's file.
     pub folder: PathBuf,
+    /// The project's folder of versions, used unless the user gives another file for the model.
+    pub default_folder: PathBuf,
     pub versions: Vec<Version>,
     pub current: Option<usize>,
 }
@@ -63,13 +69,19 @@ impl ModelVersions {
     /// # Errors
     /// Unknown version, or its file cannot be read.
     pub fn read(&self, id: usize) -> Result<Vec<u8>> {
-        let path = self.folder.join(&self.get(id)?.file);
+        let path = self.path(self.get(id)?);
         let failed = || Error::file(&path, "cannot read");
         let found = fs::metadata(&path).map_err(failed())?.len();
         if found > MAX_MODEL_BYTES {
             return Err(Error::TooLarge { path, most: MAX_MODEL_BYTES, found });
         }
         fs::read(&path).map_err(failed())
+    }
+
+    fn path(&self, version: &Version) -> PathBuf {
+        let path = self.default_folder.join(&version.file);
+        // Earlier programs gave no path of a file elsewhere.
+        if path.exists() { path } else { self.folder.join(&version.file) }
     }
 
     /// Writes a new version under its own name and makes it the one in use, at `path`.
@@ -83,7 +95,7 @@ impl ModelVersions {
         let file = free_numbered(&self.folder.join(name));
         write_atomically(&file, bytes)?;
         write_atomically(path, bytes)?;
-        self.versions.push(Version { file: file_name(&file), ..version });
+        self.versions.push(Version { file: relative(&self.default_folder, &file), ..version });
         self.current = Some(self.versions.len() - 1);
         Ok(())
     }
@@ -173,7 +185,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rod.sdg");
         fs::write(&path, "from elsewhere").unwrap();
-        let mut versions = ModelVersions { folder: folder.path().join("models"), ..ModelVersions::default() };
+        let models = folder.path().join("models");
+        let mut versions = ModelVersions { folder: models.clone(), default_folder: models, ..ModelVersions::default() };
         versions.keep(&path, b"first", version(60)).unwrap();
         versions.keep(&path, b"second", version(60)).unwrap();
         let texts = || -> Vec<String> {

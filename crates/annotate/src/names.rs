@@ -1,11 +1,29 @@
 //! Names of the files that the page writes, and the order of those that it lists.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+
+use sdg_demonstration::IMAGE_EXTENSIONS;
+
+/// Name of a project's file in its folder, and extension of the file of a photo's project.
+pub const PROJECT_FILE: &str = "sdg-project.json";
 
 /// The last part of a path, for display.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The name of a path in a project's file: relative to the folder if it is inside.
+pub fn relative(folder: &Path, path: &Path) -> String {
+    let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
+    inside.to_string_lossy().into_owned()
+}
+
+/// The absolute path, for comparisons.
+pub fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// The natural order of two names, the same as on the page: numbers by value (2 before 10), letters without regard to
@@ -60,15 +78,41 @@ pub fn free_name(beside: &Path, name: &str, extension: &str) -> PathBuf {
     free_numbered(&beside.with_file_name(format!("{stem}.{extension}")))
 }
 
-/// The path itself or, if a picture or marks with that name exist, the path with a number.
+/// Whether a file's name has the extension of a picture.
+pub fn is_picture_name(path: &Path) -> bool {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    extension.is_some_and(|extension| IMAGE_EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// The names, without extension, of the pictures in the folder of `beside`; empty if it cannot be listed.
+fn picture_stems(beside: &Path) -> BTreeSet<OsString> {
+    let folder = beside.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let paths = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    paths.filter(|path| is_picture_name(path)).filter_map(|path| path.file_stem().map(ToOwned::to_owned)).collect()
+}
+
+/// The path itself or, if a picture, marks or a project with that name exist, the path with a number. A picture with
+/// another extension would have its marks in the same file.
 pub fn free_numbered(path: &Path) -> PathBuf {
+    free_numbered_except(path, &[])
+}
+
+/// Like [`free_numbered`], also different from these names.
+pub fn free_numbered_except(path: &Path, names: &[String]) -> PathBuf {
     let (stem, extension) = (path.file_stem().unwrap_or_default(), path.extension().unwrap_or_default());
     let numbered = |n: usize| match n {
         1 => path.to_owned(),
         _ => path.with_file_name(format!("{}-{n}.{}", stem.to_string_lossy(), extension.to_string_lossy())),
     };
-    let marks = |path: &Path| ["json", "coco.json"].iter().any(|extension| path.with_extension(extension).exists());
-    let taken = |path: &Path| path.exists() || marks(path);
+    let records = ["json", "coco.json", PROJECT_FILE];
+    let has_records = |path: &Path| records.iter().any(|extension| path.with_extension(extension).exists());
+    let pictures = picture_stems(path);
+    let taken = |path: &Path| {
+        path.exists()
+            || has_records(path)
+            || path.file_stem().is_some_and(|stem| pictures.contains(stem))
+            || names.contains(&file_name(path))
+    };
     (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 
@@ -147,6 +191,8 @@ mod tests {
         assert_eq!(free_numbered(&spaced), spaced);
         std::fs::write(&spaced, "").unwrap();
         assert_eq!(free_numbered(&spaced), folder.path().join("my part-2.png"));
+        std::fs::write(folder.path().join("photo.JPG"), "").unwrap();
+        assert_eq!(free_numbered(&beside), folder.path().join("photo-2.png"));
     }
 
     #[test]

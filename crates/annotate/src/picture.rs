@@ -5,10 +5,10 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, RgbImage};
-use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
+use sdg_demonstration::{ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
 
 use crate::error::{Error, Result};
-use crate::names::{file_name, natural_order};
+use crate::names::{file_name, is_picture_name, natural_order};
 
 /// Maximum size of a photo's file.
 pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
@@ -106,8 +106,7 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed())? {
         let path = entry.map_err(failed())?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if path.is_file() && extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) {
+        if path.is_file() && is_picture_name(&path) {
             paths.push(path);
         }
     }

@@ -25,10 +25,10 @@ use serde::{Deserialize, Serialize};
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
+use crate::names::{PROJECT_FILE, absolute, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::region::Region;
 
-const FILE: &str = "sdg-project.json";
 /// Folder of pictures added on the page.
 pub const TRIED_FOLDER: &str = "tried";
 const FORMAT: u32 = 1;
@@ -46,7 +46,7 @@ pub struct ProjectPlace {
 
 impl ProjectPlace {
     pub fn of_folder(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), file: folder.join(FILE), is_folder: true }
+        Self { folder: folder.to_owned(), file: folder.join(PROJECT_FILE), is_folder: true }
     }
 
     /// The project of the photo's folder if it names the photo, otherwise the photo's own project.
@@ -55,12 +55,12 @@ impl ProjectPlace {
     /// A file cannot be read or is not a project's file.
     pub fn of_photo(photo: &Path) -> Result<Self> {
         let folder = photo.parent().unwrap_or(Path::new("")).to_owned();
-        let whole = Self { folder: folder.clone(), file: folder.join(FILE), is_folder: false };
+        let whole = Self { folder: folder.clone(), file: folder.join(PROJECT_FILE), is_folder: false };
         let known = ProjectFile::read(&whole)?;
         if known.is_some_and(|file| file.photos.contains(&relative(&folder, photo))) {
             return Ok(whole);
         }
-        Ok(Self { folder, file: photo.with_extension(FILE), is_folder: false })
+        Ok(Self { folder, file: photo.with_extension(PROJECT_FILE), is_folder: false })
     }
 
     /// The project's absolute path for display and comparison: the folder, or the file of a photo's project.
@@ -77,6 +77,17 @@ impl ProjectPlace {
 /// A file in the photo's folder cannot be read or is not a project's file.
 pub fn project_of_photo(photo: &Path) -> Result<PathBuf> {
     Ok(ProjectPlace::of_photo(photo)?.file)
+}
+
+/// The names of the pictures in the project of the photo's folder; some of the pictures may be missing.
+///
+/// # Errors
+/// The project's file cannot be read or is not a project's file.
+pub fn names_in_project(photo: &Path) -> Result<Vec<String>> {
+    let place = ProjectPlace::of_folder(photo.parent().unwrap_or(Path::new("")));
+    let ProjectFile { mut photos, tried, .. } = ProjectFile::read(&place)?.unwrap_or_default();
+    photos.extend(tried.into_iter().map(|tried| tried.file));
+    Ok(photos)
 }
 
 /// The name of the part in the project of a folder or photo, if it has one.
@@ -153,8 +164,12 @@ pub struct Gone {
 impl Gone {
     /// Opens a picture. If it cannot be read, a note says why it is left out.
     pub fn open(&mut self, path: &Path, frame: PixelFrame) -> Option<Picture> {
-        let unreadable = |error| self.notes.push(format!("{error}; this picture is left out."));
-        Picture::open(path, frame).map_err(unreadable).ok()
+        Picture::open(path, frame).map_err(|error| self.leave_out(&error)).ok()
+    }
+
+    /// Adds a note that a picture is left out.
+    pub fn leave_out(&mut self, error: &Error) {
+        self.notes.push(format!("{error}; this picture is left out."));
     }
 }
 
@@ -295,16 +310,6 @@ impl ProjectFile {
     }
 }
 
-/// The name of a path in the file: relative to the folder if it is inside.
-pub fn relative(folder: &Path, path: &Path) -> String {
-    let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
-    inside.to_string_lossy().into_owned()
-}
-
-fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -368,7 +373,7 @@ mod tests {
         let whole = ProjectFile { photos: vec!["b.png".into()], ..ProjectFile::default() };
         whole.write(&ProjectPlace::of_folder(folder.path())).unwrap();
         let place = ProjectPlace::of_photo(&at("b.png")).unwrap();
-        assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(FILE), whole));
+        assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(PROJECT_FILE), whole));
         assert_eq!(ProjectPlace::of_photo(&at("a.png")).unwrap().file, at("a.sdg-project.json"));
     }
 
@@ -391,7 +396,7 @@ mod tests {
             ("{", "sdg-project.json"),
             (r#"{"format": 7, "photos": [], "tried": [], "removed": [], "models": []}"#, "format 7"),
         ] {
-            fs::write(folder.path().join(FILE), text).unwrap();
+            fs::write(folder.path().join(PROJECT_FILE), text).unwrap();
             let place = ProjectPlace::of_folder(folder.path());
             let error = ProjectFile::open(&place).unwrap_err().to_string();
             assert!(error.contains(found), "{error}");

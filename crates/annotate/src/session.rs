@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
 use crate::model_versions::{Version, now_secs};
-use crate::names::{file_name, free_numbered, safe_stem};
+use crate::names::{file_name, free_numbered_except, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::ProjectPlace;
@@ -90,10 +90,13 @@ pub struct Session {
     /// Orientation of the pixels of all pictures.
     pixel_frame: PixelFrame,
     live: Option<LiveDesk>,
+    /// Names in the project of the camera's folder. A new photo does not get the name of a missing one, whose project
+    /// would be written over.
+    taken_names: Vec<String>,
     /// Folder for pictures added on the page before there is a photo.
     temporary: Option<TempDir>,
     /// Locks that keep other programs from writing the same files.
-    locks: Vec<WriterLock>,
+    locks: Mutex<Vec<WriterLock>>,
     state: Arc<Mutex<State>>,
     id: String,
     token: Option<String>,
@@ -111,10 +114,20 @@ impl Session {
         &self.id
     }
 
-    /// Keeps locks for the lifetime of the session.
-    pub fn holding(mut self, locks: Vec<WriterLock>) -> Self {
-        self.locks.extend(locks);
+    /// Keeps locks for the lifetime of the session, or until the project is closed.
+    pub fn holding(self, locks: Vec<WriterLock>) -> Self {
+        self.locks().extend(locks);
         self
+    }
+
+    fn locks(&self) -> MutexGuard<'_, Vec<WriterLock>> {
+        self.locks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Releases the locks when the project is closed: the session may remain in use by a running search, and the same
+    /// project can be opened again at once.
+    pub(crate) fn release_locks(&self) {
+        self.locks().clear();
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -212,11 +225,12 @@ impl Session {
     /// demonstration again.
     ///
     /// # Errors
-    /// Unknown picture, or the project cannot be written.
+    /// Unknown picture, its marks' file belongs to another photo now, or the project cannot be written.
     pub fn put_back_image(&self, id: usize) -> Result<()> {
         let mut state = self.state();
         let count = state.images.len();
-        state.images.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
+        state.images.get(id).ok_or(Error::NoSuchPicture { id, count })?.check_file(state.photos())?;
+        state.images[id].is_removed = false;
         state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|t| t.is_absent = false);
         state.save_project()
     }
@@ -287,7 +301,7 @@ impl Session {
     /// # Errors
     /// [`Error::NoCamera`].
     pub(crate) fn next_photo(&self) -> Result<PathBuf> {
-        Ok(free_numbered(&self.live_desk()?.options.photo_path))
+        Ok(free_numbered_except(&self.live_desk()?.options.photo_path, &self.taken_names))
     }
 
     /// Writes a shown frame as PNG, under an unused name, and makes it a photo of the object.

@@ -11,9 +11,9 @@ use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
-use crate::names::file_name;
+use crate::names::{absolute, file_name, relative};
 use crate::picture::Picture;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried};
 use crate::region::Region;
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
@@ -89,10 +89,15 @@ impl State {
     }
 
     /// Adds a picture with unsaved marks and returns its number.
+    ///
+    /// # Errors
+    /// The file beside it contains no marks of it, or belongs to another photo.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let opened = annotation_file::open(&picture.path, None, picture.size)?;
         let (file, note) = (opened.path, opened.note);
-        self.images.push(MarkedPicture { file, note, ..MarkedPicture::unsaved(picture, marks) });
+        let image = MarkedPicture { file, note, ..MarkedPicture::unsaved(picture, marks) };
+        image.check_file(self.photos())?;
+        self.images.push(image);
         Ok(self.images.len() - 1)
     }
 
@@ -127,6 +132,11 @@ impl State {
         (0..self.images.len()).filter(|&id| !self.images[id].is_removed)
     }
 
+    /// The object's pictures that are not removed.
+    pub fn photos(&self) -> impl Iterator<Item = &MarkedPicture> + '_ {
+        self.image_ids().map(|id| &self.images[id])
+    }
+
     /// Numbers of the pictures to try that are not removed.
     pub fn trial_ids(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.trial_pictures.len()).filter(|&id| !self.trial_pictures[id].is_removed)
@@ -144,7 +154,7 @@ impl State {
         // Without a project there is neither a photo nor a model.
         let folder = self.place.as_ref().map_or(Path::new(""), |place| &place.folder);
         let name = |picture: &Picture| relative(folder, &picture.path);
-        let marked = self.image_ids().map(|id| &self.images[id]).filter(|image| image.marks != Marks::default());
+        let marked = self.photos().filter(|image| image.marks != Marks::default());
         let marked: Vec<_> = marked.map(|image| (name(&image.picture), &image.marks)).collect();
         let negatives: Vec<_> = self.negatives().map(name).collect();
         let mut material = serde_json::to_value((marked, negatives)).unwrap_or_default();
@@ -248,6 +258,22 @@ impl MarkedPicture {
         let marked =
             Self { picture, marks: opened.marks, file: opened.path, note: opened.note, saved, is_removed: false };
         Ok((marked, opened.label))
+    }
+
+    /// Checks that no other photo has its marks in the same file, as `part.png` and `part.jpg` would.
+    ///
+    /// # Errors
+    /// [`Error::SharedMarks`].
+    pub fn check_file<'a>(&self, mut photos: impl Iterator<Item = &'a Self>) -> Result<()> {
+        let [file, picture] = [&self.file, &self.picture.path].map(|path| absolute(path));
+        match photos.find(|other| absolute(&other.file) == file && absolute(&other.picture.path) != picture) {
+            Some(other) => Err(Error::SharedMarks {
+                name: self.picture.name.clone(),
+                path: self.file.clone(),
+                other: other.picture.name.clone(),
+            }),
+            None => Ok(()),
+        }
     }
 
     /// The picture with its marks, in the form for teaching.

@@ -70,7 +70,7 @@ pub struct TrialPictureView {
 pub struct ModelView {
     /// Its index in the session.
     pub id: usize,
-    /// Its file's name.
+    /// Its file's name, or the path of a file outside the project's folder of versions.
     pub file: String,
     /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,
@@ -119,8 +119,10 @@ pub struct ComparedPicture {
     pub name: String,
     /// Whether the part is there, if the user stated it.
     pub is_there: Option<bool>,
-    /// The detections of each version.
-    pub found: [VersionFound; 2],
+    /// The detections of each version; `None` if the picture cannot be searched.
+    pub found: Option<[VersionFound; 2]>,
+    /// Why it cannot be searched.
+    pub failed: Option<String>,
 }
 
 /// The data with which the page starts.

@@ -279,6 +279,28 @@ fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
 }
 
 #[test]
+fn two_photos_never_have_their_marks_in_the_same_file() {
+    let served = Served::of_photo(folder_of(&["photo.png"]), "photo.png");
+    assert_eq!(served.ask("POST", "/api/images?name=photo.jpg", &photo_png()).json()["name"], "photo-2.jpg");
+
+    let served = Served::of_photo(folder_of(&["part.png", "part.jpg"]), "part.png");
+    let is_told = |told: &str| assert!(told.contains("part.jpg: expected") && told.contains("of part.png"), "{told}");
+    let refused = served.ask("POST", "/api/others/0/photo", b"");
+    assert_eq!(refused.status, 422);
+    is_told(&refused.text());
+    let images = ["part.png", "part.jpg"].map(|name| (served.folder.path().join(name), None)).to_vec();
+    let options = SessionOptions { images, ..SessionOptions::default() };
+    is_told(&Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string());
+
+    // One of two marked pictures of a new folder.
+    let folder = served.end();
+    std::fs::write(folder.path().join("part.json"), LABELME).unwrap();
+    let opened = session(&Served::of_project(folder));
+    assert_eq!(names(&opened["images"]), ["part.jpg"]);
+    assert!(opened["notes"][0].as_str().unwrap().starts_with("part.png: expected"), "{}", opened["notes"]);
+}
+
+#[test]
 fn without_a_project_one_is_made_of_a_photo_and_opened_again() {
     let served = Served::of_start(tempfile::tempdir().unwrap());
     let start = session(&served)["start"].clone();

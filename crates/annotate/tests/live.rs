@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use crate::served::{Answer, Served, photo};
+use crate::served::{Answer, Served, photo, photo_png};
 use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 use serde_json::{Value, json};
@@ -80,6 +80,30 @@ fn a_page_without_photos_takes_the_frame_that_was_shown() {
     let again = post(&served, "/api/live/8/photo").json();
     assert_eq!((&again["id"], &again["name"]), (&json!(1), &json!("photo-2.png")));
     assert_eq!(image::open(served.folder.path().join("photo.png")).unwrap().into_rgb8(), photo());
+}
+
+#[test]
+fn a_photo_replaces_no_file_of_a_project_whose_photo_was_deleted() {
+    let written = [
+        ("photo.sdg-project.json", "the project of photo.png"),
+        ("sdg-project.json", r#"{"format": 1, "photos": ["photo-2.png"], "tried": [], "removed": [], "models": []}"#),
+        ("tried/table.png", "a picture of that project"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("tried")).unwrap();
+    for (name, text) in written {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let camera = Arc::new(Camera::default());
+    let served = Served::with_camera_in(folder, Arc::clone(&camera) as Arc<dyn LivePictures>);
+    served.ask("POST", "/api/trial-pictures?name=table.png", &photo_png()).json();
+    camera.show(0, photo());
+    assert_eq!(get(&served, "/api/live")["next_photo"], "photo-3.png");
+    assert_eq!(post(&served, "/api/live/0/photo").json()["name"], "photo-3.png");
+    for (name, text) in written {
+        assert_eq!(std::fs::read_to_string(served.folder.path().join(name)).unwrap(), text, "{name}");
+    }
+    assert_eq!(served.ask("GET", "/api/trial-pictures/0/picture", b"").body, photo_png());
 }
 
 #[test]

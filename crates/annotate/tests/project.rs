@@ -91,6 +91,13 @@ fn models_are_versions_and_marks_that_changed_make_them_stale() {
     assert_eq!((&compared[0]["name"], &compared[0]["is_there"]), (&json!("table.png"), &Value::Null));
     let nothing = json!({"best": 0.0, "accepted": []});
     assert_eq!(compared[0]["found"], json!([nothing, nothing]));
+    // A picture that cannot be searched does not prevent the comparison in the others.
+    try_photo(&served, "cut.png");
+    std::fs::write(served.folder.path().join("tried/cut.png"), &photo_png()[..100]).unwrap();
+    let compared = served.ask("POST", "/api/models/0/compare/1", b"").json();
+    assert_eq!(compared[0]["found"], json!([nothing, nothing]));
+    assert_eq!(compared[1]["found"], Value::Null);
+    assert!(compared[1]["failed"].as_str().unwrap().starts_with("cut.png: "), "{compared}");
 }
 
 #[test]
@@ -105,6 +112,27 @@ fn a_model_is_not_old_because_its_folder_was_renamed() {
     // A folder may replace an empty one.
     std::fs::rename(folder.path(), renamed.path()).unwrap();
     assert_eq!(get(&Served::of_project(renamed))["models"][0]["is_stale"], false);
+}
+
+#[test]
+fn a_model_in_another_folder_is_found_without_naming_that_again() {
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().join("rod.sdg");
+    let in_use = |served: &Served| {
+        let models = get(served)["models"].clone();
+        models.as_array().unwrap().iter().map(|model| model["is_current"] == true).collect::<Vec<_>>()
+    };
+    let served = Served::of_project_with_model(project().end(), path.clone());
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    assert_eq!(std::fs::read_dir(out.path().join("models")).unwrap().count(), 1);
+    let served = Served::of_project(served.end());
+    assert_eq!(in_use(&served), [true]);
+    // A model in the project's folder is also found if another folder is given.
+    teach(&served);
+    let served = Served::of_project_with_model(served.end(), path);
+    assert_eq!(in_use(&served), [false, true]);
+    assert_eq!(served.ask("PUT", "/api/models/0/current", b"").status, 200);
 }
 
 #[test]

@@ -41,7 +41,11 @@ pub fn picture_of(outcome: Result<(Vec<u8>, &'static str)>) -> Response {
 fn refusal(error: &Error) -> Response {
     let status = match error {
         Error::NoSuchPicture { .. } | Error::NoSuchVersion { .. } | Error::NoSuchFrame { .. } | Error::NoCamera => 404,
-        Error::Demonstration { .. } | Error::NotMarked { .. } | Error::Request { .. } | Error::Teacher(_) => 422,
+        Error::Demonstration { .. }
+        | Error::NotMarked { .. }
+        | Error::SharedMarks { .. }
+        | Error::Request { .. }
+        | Error::Teacher(_) => 422,
         Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } | Error::Camera { .. } => 409,
         Error::TooLarge { .. } => 413,
         _ => 500,

@@ -82,8 +82,8 @@ impl Session {
     /// Makes another picture of the folder a photo of the part, with the marks beside it.
     ///
     /// # Errors
-    /// Unknown picture, marks of another picture, a photo of a calibrated camera that an Exif orientation rotates, or
-    /// the project cannot be written.
+    /// Unknown picture, marks of another picture or in another photo's file, a photo of a calibrated camera that an Exif
+    /// orientation rotates, or the project cannot be written.
     pub fn add_photo(&self, id: usize) -> Result<ImageView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
@@ -91,11 +91,13 @@ impl Session {
         let known = state.images.iter().position(|image| image.picture.path == path);
         let id = match known {
             Some(id) => {
+                state.images[id].check_file(state.photos())?;
                 state.images[id].is_removed = false;
                 id
             }
             None => {
                 let (image, label) = MarkedPicture::open(&path, self.pixel_frame)?;
+                image.check_file(state.photos())?;
                 if let Some(label) = label.filter(|_| !state.is_named) {
                     (state.label, state.is_named) = (label, true);
                 }

@@ -8,10 +8,10 @@ use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
 use crate::model_versions::ModelVersions;
-use crate::names::proposed_label;
+use crate::names::{absolute, free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, relative};
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -20,9 +20,10 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture, or a
-    /// photo of a calibrated camera that an Exif orientation rotates. Unreadable pictures of the project or of a folder
-    /// are left out; the notes for the user name them.
+    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture or are in
+    /// the file of another photo, another file in the place of a project's, or a photo of a calibrated camera that an
+    /// Exif orientation rotates. Unreadable pictures of the project or of a folder, and photos of the project whose
+    /// marks are in the file of another one, are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -57,6 +58,14 @@ impl Session {
                 continue;
             };
             let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
+            if let Err(error) = image.check_file(images.iter()) {
+                if is_given {
+                    return Err(error);
+                }
+                gone.leave_out(&error);
+                gone.photos.push(relative(&folder, path));
+                continue;
+            }
             label = label.take().or(named);
             images.push(image);
         }
@@ -69,8 +78,12 @@ impl Session {
                 Some(made.map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?)
             }
         };
+        let default_folder = home.with_file_name("models");
+        let folder_of_out = options.model_path.as_ref().map(|path| path.with_file_name("models"));
+        let other_folder = folder_of_out.filter(|folder| absolute(folder) != absolute(&default_folder));
         let models = ModelVersions {
-            folder: options.model_path.as_ref().unwrap_or(&home).with_file_name("models"),
+            folder: other_folder.unwrap_or_else(|| default_folder.clone()),
+            default_folder,
             versions: project.models,
             current: project.current_model,
         };
@@ -117,6 +130,7 @@ impl Session {
             region,
             is_model_lost,
         };
+        let taken_names = options.live.as_ref().map(|live| names_in_project(&live.photo_path)).transpose()?;
         state.save_project()?;
         Ok(Self {
             teacher,
@@ -126,8 +140,9 @@ impl Session {
             home,
             pixel_frame: options.pixel_frame,
             live: options.live.clone().map(LiveDesk::new),
+            taken_names: taken_names.unwrap_or_default(),
             temporary,
-            locks: Vec::new(),
+            locks: Mutex::default(),
             state: Arc::new(Mutex::new(state)),
             id: new_token()?,
             token: options.token.clone(),
@@ -152,7 +167,8 @@ impl Session {
         for trial in &mut state.trial_pictures {
             let path = &trial.picture.path;
             if let Ok(name) = path.strip_prefix(temporary.path()) {
-                let kept = folder.join(name);
+                // The folder may have pictures of another project.
+                let kept = free_numbered(&folder.join(name));
                 std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
                 std::fs::copy(path, &kept).map_err(Error::file(&kept, "cannot write"))?;
                 trial.picture.path = kept;

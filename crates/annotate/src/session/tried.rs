@@ -113,7 +113,7 @@ impl Session {
     /// The detections of two model versions in every picture to try, in the current search region.
     ///
     /// # Errors
-    /// Unknown version, or files cannot be read.
+    /// Unknown version, or a version's file cannot be read.
     pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
         let (models, pictures, region) = {
             let state = self.state();
@@ -127,7 +127,7 @@ impl Session {
         for model in &models {
             model.look_in(region).map_err(Error::Teacher)?;
         }
-        let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
+        let compare = |trial: &TrialPicture| {
             let pixels = trial.picture.pixels()?;
             let found = |model: &dyn TaughtModel| {
                 let found = model.detect(&pixels).map_err(Error::Teacher)?;
@@ -137,11 +137,18 @@ impl Session {
                 let accepted = accepted.map(marks).collect();
                 Ok::<_, Error>(VersionFound { best, accepted })
             };
+            Ok::<_, Error>([found(&*models[0])?, found(&*models[1])?])
+        };
+        let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
             let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
-            let found = [found(&*models[0])?, found(&*models[1])?];
-            Ok(ComparedPicture { id, name: trial.picture.name, is_there, found })
+            // A picture that cannot be searched, as one of another size, does not prevent the comparison in the others.
+            let (found, failed) = match compare(&trial) {
+                Ok(found) => (Some(found), None),
+                Err(error) => (None, Some(error.to_string())),
+            };
+            ComparedPicture { id, name: trial.picture.name, is_there, found, failed }
         });
-        compared.collect()
+        Ok(compared.collect())
     }
 
     /// Teaches model S from the demonstrations and, in addition, a tried picture. Returns the model's best score in
@@ -185,8 +192,8 @@ impl Session {
     /// copied beside the first picture under an unused name: no marks are written into other folders.
     ///
     /// # Errors
-    /// Unknown picture, the picture is a demonstration already, an Exif orientation rotates a picture of a calibrated
-    /// camera, or a file cannot be written.
+    /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
+    /// orientation rotates a picture of a calibrated camera, or a file cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();

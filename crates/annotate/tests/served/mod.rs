@@ -224,6 +224,13 @@ impl Served {
         Self::open(folder, options, PATIENCE)
     }
 
+    /// Like [`Self::of_project`], with a file for the model.
+    pub fn of_project_with_model(folder: tempfile::TempDir, model_path: PathBuf) -> Self {
+        let (project, model_path) = (Some(folder.path().to_owned()), Some(model_path));
+        let options = SessionOptions { project, model_path, ..SessionOptions::default() };
+        Self::open(folder, options, PATIENCE)
+    }
+
     /// Like [`Self::of_project`], with a calibrated camera.
     pub fn of_calibrated_project(folder: tempfile::TempDir) -> Self {
         let project = Some(folder.path().to_owned());
@@ -271,7 +278,11 @@ impl Served {
 
     /// A server with a camera and no photo, in an empty folder.
     pub fn with_camera(pictures: Arc<dyn LivePictures>) -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        Self::with_camera_in(tempfile::tempdir().unwrap(), pictures)
+    }
+
+    /// A server with a camera that writes its photos into a folder.
+    pub fn with_camera_in(folder: tempfile::TempDir, pictures: Arc<dyn LivePictures>) -> Self {
         let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
         let options = SessionOptions { live: Some(live), ..SessionOptions::default() };
         Self::open(folder, options, PATIENCE)

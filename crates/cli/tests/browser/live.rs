@@ -194,6 +194,23 @@ fn with_a_calibrated_camera_the_grasp_is_told_in_millimetres() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn a_kept_frame_whose_search_failed_is_searched_again() {
+    let page = open(&[]);
+    take_and_mark(&page);
+    teach(&page);
+    let fail = "const send = window.fetch;
+        window.fetch = async (path, options) => (/live.*detect/.test(path)
+            ? new Response('{\"error\": \"too dark\"}', { status: 422 }) : send(path, options))";
+    page.browser.run(fail, &[]).unwrap();
+    page.click("#go-try");
+    page.wait_for("the failure", "return document.getElementById('live-error').innerText === 'too dark'");
+    page.browser.press(&["k"]).unwrap();
+    patiently(&page, "its grasp", "return document.getElementById('strip').innerText.includes('1 found')");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_camera_that_goes_away_is_told_and_comes_back() {
     let page = open(&[]);
     let (table, away) = (page.folder.path().join("table"), page.folder.path().join("away"));

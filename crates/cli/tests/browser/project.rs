@@ -32,6 +32,11 @@ fn shown(page: &Page) {
     page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
 }
 
+fn annotation(path: &Path) -> Annotation {
+    let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: None };
+    Annotation::read(&std::fs::read(path).unwrap(), &facts).unwrap().remove(0)
+}
+
 /// A port that was free a moment ago.
 fn free_port() -> String {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string()
@@ -367,10 +372,7 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
         "const line = document.getElementById('saved').innerText; return line.startsWith('Saved in') && line",
     );
     assert_eq!(line, json!("Saved in photo.coco.json"));
-    let turned = |path: &Path| {
-        let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: None };
-        Annotation::read(&std::fs::read(path).unwrap(), &facts).unwrap().remove(0).grasp.unwrap().angle()
-    };
+    let turned = |path: &Path| annotation(path).grasp.unwrap().angle();
     let by = turned(&saved).degrees() - turned(&saved.with_file_name("photo.json")).degrees();
     assert!((by - 5.0).abs() < 0.1, "five keys turn by five degrees: {by}");
     assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
@@ -387,6 +389,26 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     page.settle_frames();
     page.screenshot("project-9-another-key");
     page.assert_accessible("another key");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn marks_that_another_page_changed_are_adopted_when_this_one_is_used_again() {
+    let page = open(&[], &["photo"]);
+    let saved = page.folder.path().join("project/photo.coco.json");
+    let before = annotation(&saved.with_file_name("photo.json")).bbox.x1;
+    let change = "return import('/page/store.js').then(({ state }) => {
+            const marks = structuredClone(state.images[0].marks);
+            marks.box[0] -= 5;
+            return fetch('/api/images/0/marks', { method: 'PUT', body: JSON.stringify(marks) });
+        }).then((answer) => { dispatchEvent(new Event('focus')); return answer.ok; })";
+    assert_eq!(page.browser.run(change, &[]).unwrap(), json!(true));
+    page.wait_for("the change", "return !document.getElementById('undo').disabled");
+    page.browser.press(&["]"]).unwrap();
+    page.settle();
+    let after = annotation(&saved).bbox.x1;
+    assert!((after - (before - 5.0)).abs() < 0.1, "{before} {after}");
+    page.assert_quiet();
 }
 
 #[test]
@@ -420,6 +442,28 @@ fn kept_marks_wait_for_their_project_while_another_is_open_at_the_same_port() {
     page.wait_for("the marks to be sent", sent);
     let is_changed = [&project, &other].map(|folder| folder.join("photo.coco.json").exists());
     assert_eq!(is_changed, [true, false]);
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn kept_marks_are_sent_although_their_file_has_a_box_of_the_outline() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
+    let draw = "return Promise.all(['store', 'editing'].map((name) => import(`/page/${name}.js`)))
+        .then(([{ marks }, { commit }]) => {
+            Object.assign(marks(), { box: null, outline: [[260, 170], [385, 170], [385, 275], [260, 275]] });
+            commit();
+        })";
+    page.browser.run(draw, &[]).unwrap();
+    page.wait_for("saved", "return document.getElementById('saved').innerText === 'Saved in photo.coco.json'");
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.browser.press(&["]"]).unwrap();
+    are_kept(&page);
+    page.browser.open("about:blank").unwrap();
+    page.start_server();
+    page.browser.open(&page.url.clone()).unwrap();
+    let sent = "return document.getElementById('toasts').innerText.includes('kept in this browser are saved now')";
+    page.wait_for("the marks to be sent", sent);
 }
 
 #[test]

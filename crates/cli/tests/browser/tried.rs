@@ -221,6 +221,47 @@ fn pictures_of_the_folder_are_shown_once_they_are_taken_in() {
     page.assert_quiet();
 }
 
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn an_unreadable_picture_of_the_folder_does_not_stop_those_after_it() {
+    let page = Page::open();
+    let photo = std::fs::read(shipped_photo()).unwrap();
+    for (name, bytes) in [("a.png", &photo[..]), ("b.png", &photo[..200]), ("c.png", &photo[..])] {
+        std::fs::write(page.folder.path().join(name), bytes).unwrap();
+    }
+    page.click("#tab-try");
+    page.browser.run("document.getElementById('add-others').click()", &[]).unwrap();
+    page.wait_for("the list", "return document.querySelectorAll('#folder-list button').length === 3");
+    page.click("#folder-all");
+    page.wait_for("its name", "return document.getElementById('toasts').innerText.includes('b.png')");
+    page.wait_for("the others", "return document.querySelectorAll('#strip button').length === 2");
+    page.wait_for("one left", "return document.getElementById('add-others').innerText === 'From this folder (1)…'");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_search_without_an_answer_is_repeated_and_one_that_fails_is_not_waited_for() {
+    let page = taught();
+    // The first search gets no answer, its repetition an error.
+    let fail = "const send = window.fetch; let count = 0;
+        window.fetch = async (path, options) => {
+            if (!path.endsWith('/detect')) return send(path, options);
+            while (document.querySelectorAll('#strip button').length < 2) await new Promise(requestAnimationFrame);
+            count += 1;
+            if (count === 1) throw new TypeError('no connection');
+            return count === 2 ? new Response('{\"error\": \"too dark\"}', { status: 422 }) : send(path, options);
+        }";
+    page.browser.run(fail, &[]).unwrap();
+    add(&page, &["a.png", "b.png"].map(|name| (name.to_owned(), photo())));
+    patiently(&page, "the second picture", "return document.getElementById('strip').innerText.includes('1 found')");
+    page.settle_frames();
+    assert_eq!(page.text("#found"), "too dark");
+    let count = page.text("#least-score-count");
+    assert!(count.ends_with("in 1 of 1 pictures."), "{count}");
+    assert_eq!(page.browser.run("return document.getElementById('looked').hidden", &[]).unwrap(), json!(true));
+    page.assert_quiet();
+}
+
 /// The texts of all elements that a selector names.
 fn texts(page: &Page, css: &str) -> Vec<String> {
     let script = "return [...document.querySelectorAll(arguments[0])].map((e) => e.innerText)";
