@@ -12,6 +12,13 @@ fn bash(commands: &str) -> String {
         .args(["-euo", "pipefail", "-c", commands, "bash"])
         .arg(folder.path())
         .current_dir(root())
+        // The repositories of a script are its own, without a developer's settings.
+        .env("GIT_CONFIG_GLOBAL", "/dev/null")
+        .env("GIT_CONFIG_SYSTEM", "/dev/null")
+        .env_remove("GIT_CONFIG_PARAMETERS")
+        .env_remove("GIT_DIR")
+        .env_remove("GIT_WORK_TREE")
+        .env_remove("GIT_INDEX_FILE")
         .output()
         .unwrap();
     assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));

@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 tools=target/packages/tools
-[ -x "$tools/bin/cargo-cyclonedx" ] || cargo install --quiet --debug --locked --root "$tools" cargo-cyclonedx@0.5.9
+[ -x "$tools/bin/cargo-cyclonedx" ] || env -u CARGO_TARGET_DIR cargo install --quiet --debug --locked --root "$tools" cargo-cyclonedx@0.5.9
 # cargo-cyclonedx writes a file into the folder of each member of the workspace.
 name=sdg-what-is-in-it
 trap 'find . -path ./target -prune -o -name "$name.json" -exec rm {} +' EXIT

@@ -11,7 +11,7 @@ if [ -z "$baseline" ]; then
     echo "release: interfaces not compared: there is no earlier tag v* to compare with (0.2.0 will be the first)"
     exit 0
 fi
-[ -x "$tools/bin/cargo-semver-checks" ] || cargo install --quiet --debug --locked --root "$tools" cargo-semver-checks@0.51.0
+[ -x "$tools/bin/cargo-semver-checks" ] || env -u CARGO_TARGET_DIR cargo install --quiet --debug --locked --root "$tools" cargo-semver-checks@0.51.0
 crates=("$@")
 [ $# -gt 0 ] || read -ra crates <<<"$(sed -n 's/^PACKAGED = //p' Makefile)"
 PATH=$PWD/$tools/bin:$PATH CARGO_TARGET_DIR=target/packages/semver \

@@ -22,7 +22,7 @@ zig_target=target/packages/target
 built=$zig_target/$triple/$profile
 
 if [ -n "${AUDITABLE:-}" ]; then
-    [ -x "$tools/bin/cargo-auditable" ] || cargo install --quiet --debug --locked --root "$tools" cargo-auditable@0.7.7
+    [ -x "$tools/bin/cargo-auditable" ] || env -u CARGO_TARGET_DIR cargo install --quiet --debug --locked --root "$tools" cargo-auditable@0.7.7
     # zigbuild calls a single program as cargo.
     printf '#!/bin/sh\nexec "%s" auditable "$@"\n' "$cargo_for_target" >"$tools/auditable-cargo"
     chmod +x "$tools/auditable-cargo"

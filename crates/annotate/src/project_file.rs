@@ -63,11 +63,16 @@ impl ProjectPlace {
         Ok(Self { folder, file: photo.with_extension(PROJECT_FILE), is_folder: false })
     }
 
-    /// The project's absolute path for display and comparison: the folder, or the file of a photo's project.
+    /// The project's path for display and comparison, the same for every spelling: the folder, or the file of a photo's
+    /// project.
     pub fn shown(&self) -> String {
-        let path = absolute(if self.is_folder { &self.folder } else { &self.file });
+        let folder = fs::canonicalize(if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder });
         // A folder is the same with a slash at its end.
-        path.components().collect::<PathBuf>().display().to_string()
+        let folder = folder.unwrap_or_else(|_| absolute(&self.folder).components().collect());
+        match self.file.file_name() {
+            Some(name) if name != PROJECT_FILE => folder.join(name).display().to_string(),
+            _ => folder.display().to_string(),
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::camera::Camera;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::threads::{check_process, on_threads};
+use crate::threads::{check_reader, on_threads};
 
 /// The searched region of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -92,7 +92,7 @@ impl Model {
     /// one with threads of this library.
     pub fn read(path: &Path) -> Result<Self> {
         // Reading computes the search's data on several threads.
-        check_process()?;
+        check_reader()?;
         sdg_inputs::read_model(path, &Device::flex()).map(Self::from).map_err(|error| {
             let fault = Fault::from(error);
             // A damaged photo in the file counts as a damaged model.

@@ -10,8 +10,10 @@ use crate::fault::{Fault, FaultKind, Result};
 
 /// Idle pools: concurrent callers use one each.
 static IDLE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
-/// Id of the first process that computed, which owns the threads; 0 before any computation.
+/// Id of the first process that detected or taught, which owns its threads; 0 before.
 static COMPUTING_PID: AtomicU32 = AtomicU32::new(0);
+/// Id of the first process that read a model, which owns one thread per core; 0 before.
+static READING_PID: AtomicU32 = AtomicU32::new(0);
 /// Maximum number of threads.
 const MAX_THREADS: usize = 1024;
 
@@ -22,7 +24,10 @@ const MAX_THREADS: usize = 1024;
 /// library.
 pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T> {
     check_process()?;
-    let Some(count) = threads else { return Ok(work()) };
+    let Some(count) = threads else {
+        check_owner(READING_PID.load(Ordering::Relaxed))?;
+        return Ok(work());
+    };
     if !(1..=MAX_THREADS).contains(&count) {
         return Err(Fault::new(
             FaultKind::Argument,
@@ -49,11 +54,28 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
 /// Rejects a forked process: it does not have the threads of its parent, and would wait for them forever.
 ///
 /// # Errors
-/// The process was forked from one that had computed.
+/// The process was forked from one that had detected or taught.
 pub(crate) fn check_process() -> Result<()> {
+    claim(&COMPUTING_PID)
+}
+
+/// Rejects a forked process before a model is read, which takes one thread per core.
+///
+/// # Errors
+/// The process was forked from one that had read a model, detected or taught.
+pub(crate) fn check_reader() -> Result<()> {
+    check_owner(COMPUTING_PID.load(Ordering::Relaxed))?;
+    claim(&READING_PID)
+}
+
+fn claim(owner: &AtomicU32) -> Result<()> {
     let own = process::id();
-    match COMPUTING_PID.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
-        Err(first) if first != own => Err(Fault::new(
+    check_owner(owner.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed).err().unwrap_or(own))
+}
+
+fn check_owner(owner: u32) -> Result<()> {
+    match owner {
+        other if other != 0 && other != process::id() => Err(Fault::new(
             FaultKind::Forked,
             "expected a new process (spawn), found a process that was forked after its parent had loaded a model, detected or taught: the threads \
              of the parent do not exist in it",

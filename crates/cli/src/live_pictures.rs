@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use sdg_camera::{Address, Camera, Encoding, Frame, OpenOptions};
+use sdg_camera::{Address, Camera, CameraError, Encoding, Fault, Frame, OpenOptions};
 
 use crate::exit::Usage;
 use crate::shared_args::seconds;
@@ -177,6 +177,8 @@ pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
     loop {
         match camera.next_frame() {
             Ok(frame) => return Ok(frame),
+            // A folder that gets no picture for a while is no fault.
+            Err(CameraError::Fault { camera, fault: Fault::Stale { .. } }) if camera.starts_with("dir:") => {}
             Err(error) if error.is_passing() && num_faults < MAX_FAULTS => {
                 eprintln!("sdg: {error}");
                 num_faults += 1;
@@ -190,7 +192,7 @@ pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
 mod tests {
     use super::*;
     use image::RgbImage;
-    use sdg_camera::{CameraError, Fault, LatestFrame};
+    use sdg_camera::LatestFrame;
     use std::sync::mpsc::{Sender, channel};
 
     /// Twice as many faults as are skipped, then a frame, then the end, before which it sends a message.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
-use sdg_calibration::CalibratedCamera;
+use sdg_calibration::{CalibratedCamera, UNCALIBRATED};
 use sdg_geometry::PinholeCamera;
 
 use crate::camera_files::MAX_BYTES;
@@ -63,7 +63,9 @@ impl CameraUpdate {
     /// be written.
     pub fn write(self, intrinsics: PinholeCamera, name: Option<String>) -> Result<()> {
         let Self { path, existing, old } = self;
-        let name = name.or(old.map(|old| old.name)).unwrap_or_else(|| DEFAULT_NAME.to_owned());
+        // A calibration replaces an estimate, whose name says that it is one.
+        let old_name = old.map(|old| old.name).filter(|name| name != UNCALIBRATED);
+        let name = name.or(old_name).unwrap_or_else(|| DEFAULT_NAME.to_owned());
         let camera = without_pose(name, intrinsics);
         // A fitted lens may fold the picture, and then every command refuses the file.
         CalibratedCamera::from_yaml(&camera.to_yaml()).with_context(|| path.display().to_string())?;
@@ -91,6 +93,11 @@ mod tests {
         let path = folder.path().join("camera.yaml");
         let good = PinholeCamera::symmetric(640, 480, 400.0);
         let folding = PinholeCamera { lens: PlumbBob { k1: -1.5, ..PlumbBob::NONE }, ..good };
+        // An estimate's name does not remain.
+        fs::write(&path, without_pose(UNCALIBRATED.to_owned(), good).to_yaml()).unwrap();
+        CameraUpdate::read(&path).unwrap().write(good, None).unwrap();
+        assert!(!fs::read_to_string(&path).unwrap().contains(UNCALIBRATED));
+        fs::remove_file(&path).unwrap();
         let refusal = || format!("{:#}", CameraUpdate::read(&path).unwrap().write(folding, None).unwrap_err());
         let error = refusal();
         assert!(error.contains("fold the picture") && !path.exists(), "{error}");

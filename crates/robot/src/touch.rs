@@ -26,6 +26,9 @@ const YIELDING_M_PER_NS: f64 = 0.02;
 /// Largest speed of the reference while pressing, m/s.
 const MAX_YIELDING_M_S: f64 = 0.015;
 
+/// Number of consecutive cycles with the force of a contact after which it counts: a single estimate may be noise.
+const CONTACT_CYCLES: u32 = 10;
+
 /// Smallest force at the end of pressing that confirms a contact, as a fraction of the requested force: a momentary
 /// force in free air is none.
 const MIN_PRESSED_SHARE: f64 = 0.25;
@@ -127,6 +130,7 @@ pub struct Descent {
     down_m: f64,
     speed_m_s: f64,
     free_air_n: f64,
+    num_contact_cycles: u32,
     is_contact: bool,
     peak_n: f64,
     force_sum_n: f64,
@@ -147,6 +151,7 @@ impl Descent {
             down_m: 0.0,
             speed_m_s: 0.0,
             free_air_n: 0.0,
+            num_contact_cycles: 0,
             is_contact: false,
             peak_n: 0.0,
             force_sum_n: 0.0,
@@ -179,7 +184,9 @@ impl Descent {
             Phase::Down => {
                 self.speed_m_s = self.touch_down.speed_m_s * (phase_secs / RAMP_SECS).min(1.0);
                 self.peak_n = self.peak_n.max(pressed_n);
-                self.is_contact = pressed_n >= self.touch_down.contact_n;
+                let is_touching = pressed_n >= self.touch_down.contact_n;
+                self.num_contact_cycles = if is_touching { self.num_contact_cycles + 1 } else { 0 };
+                self.is_contact = self.num_contact_cycles >= CONTACT_CYCLES;
                 let is_at_end = way_m >= self.touch_down.max_way_m || self.down_m - way_m >= MAX_LEAD_M;
                 if self.is_contact || is_at_end {
                     self.enter(Phase::Pressing);

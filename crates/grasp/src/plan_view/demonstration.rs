@@ -123,8 +123,13 @@ fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Res
     // The jaws lie beside the line, where a tilted camera has another scale than along it.
     let jaw_width = match (marked.jaw_width, &marked.grasp) {
         (Some(width), Some(line)) => {
-            let [one, other] = PlanarGrasp::from_line(line, width).jaws();
-            Some((shown(&one)? - shown(&other)?).norm())
+            let jaws = PlanarGrasp::from_line(line, width).jaws().map(|jaw| view.from_picture(camera, &jaw));
+            Some(match (jaws, &grasp) {
+                ([Some(one), Some(other)], _) => (one - other).norm(),
+                // A jaw beyond the picture may have no position; the scale along the line is then used.
+                (_, Some(shown)) => width * shown.length() / line.length(),
+                (_, None) => width,
+            })
         }
         (width, _) => width,
     };

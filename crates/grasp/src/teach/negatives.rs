@@ -37,8 +37,8 @@ pub(crate) struct NegativeScenes {
 /// in a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
-/// Minimum length of the part in a halved photo: shorter ones have too few edges to compare. Chosen by hand.
-const MIN_PART_PX: f64 = 40.0;
+/// Minimum length of the part in a halved photo, as in a photo for teaching: shorter ones have too few edges to compare.
+const MIN_PART_PX: f64 = 20.0;
 
 impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.

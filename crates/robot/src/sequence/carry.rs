@@ -92,7 +92,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 // A joint limit or an obstacle may end the descent before the contact in one orientation of the part
                 // and not in another.
                 if let Some(end) = end
-                    && let Err(because) = self.goes_on_down(&end, soft_m)?
+                    && let Err(because) = self.goes_on_down(&end, &aim, goal.bin_m.is_some())?
                 {
                     why.get_or_insert(because);
                     continue;
@@ -156,18 +156,20 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Err(Stop::Failed(GraspStep::Carry, why))
     }
 
-    /// Checks that the arm can descend from a configuration to the lowest possible contact; otherwise returns the
-    /// reason.
-    fn goes_on_down(&self, from: &JointVector, soft_m: f64) -> Steps<Result<(), String>> {
-        let base_from_tcp = self.robot.geometry().forward(from);
-        if let Err(why) = self.free_line(from, &above(&base_from_tcp, -SOFT_WAY_M))? {
-            return Ok(Err(why));
+    /// Checks that the arm can descend from a configuration to the lowest possible contact, and that the hand has room
+    /// down to the expected one; otherwise returns the reason.
+    fn goes_on_down(&self, from: &JointVector, aim: &Aim, is_bin: bool) -> Steps<Result<(), String>> {
+        let arm = self.robot.geometry();
+        let base_from_tcp = arm.forward(from);
+        let lowest = above(&base_from_tcp, -(aim.soft_m + BELOW_M));
+        if let Err(error) = arm.straight_path(from, &lowest, &LineOptions::default()) {
+            return Ok(Err(error.to_string()));
         }
-        // A contact is lower than expected if the surface is; the parts beside the place are then lower, too. In a bin,
-        // it is lower than the parts only if they do not lie where they are assumed.
-        let without_parts = Surroundings { lying: &[], ..self.surroundings() };
-        let lowest = above(&base_from_tcp, -(soft_m + BELOW_M));
-        Ok(self.free_line_among(&without_parts, from, &lowest)?.map(|_| ()))
+        // Parts in a bin may lie anywhere: the contact ends the descent.
+        let lying = if is_bin { &[] } else { self.known.lying.all() };
+        let surroundings = Surroundings { lying, ..self.surroundings() };
+        let contact = above(&base_from_tcp, -aim.soft_m);
+        Ok(self.free_line_among(&surroundings, from, &contact)?.map(|_| ()))
     }
 
     fn go_above_place(&mut self, carried: Carried) -> Steps<()> {

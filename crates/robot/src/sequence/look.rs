@@ -113,10 +113,17 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Fails if the picture on which the next motion depends is too old, for this motion and for every later one that
     /// depends on the same picture.
     pub(super) fn check_age(&mut self) -> Steps<()> {
+        self.check_age_with(0.0)?;
+        self.known.picture_time = None;
+        Ok(())
+    }
+
+    /// As [`Self::check_age`], without a motion that follows: the picture may be this much older, in seconds.
+    pub(super) fn check_age_with(&self, more_secs: f64) -> Steps<()> {
         let Some(taken) = self.known.picture_time else { return Ok(()) };
-        let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.cell.config.max_detection_age_secs);
+        let max_secs = self.cell.config.max_detection_age_secs + more_secs;
+        let age_secs = taken.elapsed().as_secs_f64();
         if age_secs <= max_secs {
-            self.known.picture_time = None;
             return Ok(());
         }
         Err(Stop::Failed(

@@ -395,7 +395,8 @@ impl Arm for TrajectoryArm {
 /// Whether an object grasped with an opening (m) is still between the fingers at their present opening (m): another
 /// client of the gripper may have released it.
 fn still_holds(grasped_m: Option<f64>, opening_m: f64) -> bool {
-    grasped_m.is_some_and(|grasped_m| (opening_m - grasped_m).abs() <= MAX_WIDTH_CHANGE_M)
+    opening_m > MIN_HELD_WIDTH_M
+        && grasped_m.is_some_and(|grasped_m| (opening_m - grasped_m).abs() <= MAX_WIDTH_CHANGE_M)
 }
 
 #[cfg(test)]
@@ -406,6 +407,8 @@ mod tests {
     fn an_object_that_another_client_released_is_not_held() {
         assert!(still_holds(Some(0.030), 0.031));
         assert!(!still_holds(Some(0.030), 0.080) && !still_holds(Some(0.030), 0.0) && !still_holds(None, 0.030));
+        // A thin part was taken out, and the fingers have closed.
+        assert!(!still_holds(Some(0.003), 0.0));
     }
 
     #[test]

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use nalgebra::Point3;
 use sdg_kinematics::collision::Capsule;
+use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{Trajectory, ready_pose};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -89,15 +91,29 @@ fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> R
         check_height(&motion, robot.limits(), if is_holding { workcell.part_radius_m } else { 0.0 })?;
         return Ok(vec![motion]);
     }
-    // Only the largest extent of the part from the tcp is known.
-    let part = [Capsule::new([0.0; 3], [0.0; 3], workcell.part_radius_m)];
+    let q = robot.commanded()?;
+    let radius_m = held_radius_m(workcell, &robot.geometry().forward(&q).translation.vector.into());
+    let part = [Capsule::new([0.0; 3], [0.0; 3], radius_m)];
     let surroundings = Surroundings {
         obstacles: &workcell.obstacles,
-        held: if is_holding { &part[..] } else { &[] },
+        held: if is_holding && radius_m > 0.0 { &part[..] } else { &[] },
         table_clearance_m: FREE_CLEARANCE_M,
         ..Surroundings::default()
     };
     Ok(robot.plan_around(&surroundings, &Destination::Configuration(&home), &joints)?.motions)
+}
+
+/// Distance from the tcp to which the held part is kept away from obstacles, m. Only the part's largest extent is known:
+/// an obstacle that is nearer at the start does not touch the part, and must not prevent the motion away from it.
+fn held_radius_m(workcell: &Workcell, tcp: &Point3<f64>) -> f64 {
+    /// In addition to the planner's margin, m.
+    const ROOM_M: f64 = 0.002;
+    let kept_m = PlanOptions::default().margin_m + ROOM_M;
+    let free_m = workcell.obstacles.iter().map(|obstacle| {
+        let p_in_obstacle = obstacle.base_from_obstacle.inverse() * tcp;
+        obstacle.shape.signed_distance_m(&p_in_obstacle) - kept_m
+    });
+    free_m.fold(workcell.part_radius_m, f64::min).max(0.0)
 }
 
 /// Fails if a motion from above the minimum height of free motions passes below it. From a lower start, for example
@@ -126,7 +142,7 @@ fn follow<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>) -> sdg_rob
 mod tests {
     use std::path::Path;
 
-    use nalgebra::Isometry3;
+    use nalgebra::{Isometry3, Vector3};
     use sdg_kinematics::collision::{Obstacle, Shape};
     use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
     use sdg_robot::{ArmState, CheckedMotion, HandCommand, HandState, Load, LookOut, MotionEnd, PlannedArm, Watch};
@@ -211,9 +227,13 @@ mod tests {
             base_from_obstacle: Isometry3::translation(tcp.x, tcp.y, tcp.z - 0.06),
         };
         let workcell = Workcell { obstacles: vec![obstacle], ..workcell() };
-        go_home(&workcell, false).unwrap();
-        let error = go_home(&workcell, true).unwrap_err().to_string();
-        assert!(error.contains("post"), "{error}");
+        let radius_m = |up_m: f64| held_radius_m(&workcell, &Point3::from(tcp.vector + Vector3::z() * up_m));
+        assert!((0.030..0.040).contains(&radius_m(0.0)), "{}", radius_m(0.0));
+        assert!(radius_m(0.1) == workcell.part_radius_m && radius_m(-0.06) == 0.0);
+        // A part that is near an obstacle can be moved away from it.
+        for is_grasping in [false, true] {
+            go_home(&workcell, is_grasping).unwrap();
+        }
     }
 
     #[test]

@@ -74,9 +74,9 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
 
 /// Checks that `~/teach_trigger` teaches a model with lengths if the node needs them.
 fn check_trigger(args: &Ros2Args) -> Result<(), Usage> {
-    let needs_lengths = args.camera.is_some() || args.base_frame.is_some();
+    let needs_lengths = args.camera.is_some() || args.base_frame.is_some() || args.arm.allow_motion;
     if args.teach.teach_demo.is_some() && needs_lengths && args.teach.teach_mark_height_mm.is_none() {
-        let why = "a node with --camera or --base-frame uses only models with lengths";
+        let why = "a node with --camera, --base-frame or --allow-motion uses only models with lengths";
         return Err(Usage(format!("--teach-demo: expected --camera and --teach-mark-height-mm, because {why}")));
     }
     Ok(())
