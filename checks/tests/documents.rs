@@ -242,8 +242,9 @@ fn every_version_is_that_of_the_workspace() {
     let version = env!("CARGO_PKG_VERSION");
     for manifest in tracked("*Cargo.toml") {
         for line in read(&manifest).lines().filter(|line| line.starts_with("sdg-") && line.contains("path = ")) {
-            if line.contains("version = ") {
-                compare(&manifest, quoted(line, "version = \""), version);
+            // Not the end of a name, such as sdg-weights-conversion.
+            if line.contains(" version = ") {
+                compare(&manifest, quoted(line, " version = \""), version);
             }
         }
     }

@@ -40,6 +40,8 @@ fn raised() -> (GraspModel, Workcell, MountedCamera) {
     let mount = cell.wrist_camera();
     let q = GraspConfig::default().look_outs[0].configuration(cell.geometry(), &mount, 0.0).unwrap();
     cell.reset(&q).unwrap();
+    // A picture computes the positions.
+    cell.wrist_view().unwrap();
     let camera = MountedCamera {
         intrinsics: PinholeCamera::WRIST,
         pose: CameraPose::OnFlange(cell.told_flange_from_camera()),

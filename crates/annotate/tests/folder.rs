@@ -285,6 +285,7 @@ fn two_photos_never_have_their_marks_in_the_same_file() {
 
     let served = Served::of_photo(folder_of(&["part.png", "part.jpg"]), "part.png");
     let is_told = |told: &str| assert!(told.contains("part.jpg: expected") && told.contains("of part.png"), "{told}");
+    assert_eq!(names(&session(&served)["others"]), ["part.jpg"]);
     let refused = served.ask("POST", "/api/others/0/photo", b"");
     assert_eq!(refused.status, 422);
     is_told(&refused.text());

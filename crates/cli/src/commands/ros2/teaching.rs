@@ -70,13 +70,14 @@ pub(super) fn teach(job: &TeachJob, device: &Device, camera: Option<&Path>, inte
     Ok(())
 }
 
-#[cfg(all(test, feature = "ndarray"))]
+#[cfg(test)]
 mod tests {
-    use super::*;
-    use sdg_grasp::ComputeBackend;
-
+    #[cfg(feature = "ndarray")]
     #[test]
     fn a_service_teaches_on_the_device_of_the_node() {
+        use super::*;
+        use sdg_grasp::ComputeBackend;
+
         let args = TeachTriggerArgs {
             teach_demo: Some("part.png".to_owned()),
             teach_out: Some("part.sdg".into()),
