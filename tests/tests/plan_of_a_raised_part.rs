@@ -79,7 +79,9 @@ fn a_given_height_of_the_marks_is_where_a_dry_run_searches_first() {
 fn a_part_that_was_put_down_is_searched_at_the_height_of_its_place() {
     let part = ObjectSpec::by_name("pendulum").unwrap();
     let (model, mut cell, camera) = raised();
-    let expected = marked_grasp(&part, &cell.base_from_object().unwrap()).base_from_tcp;
+    // The marked grasp is that of a part on the table.
+    let mut expected = marked_grasp(&part, &cell.base_from_object().unwrap()).base_from_tcp;
+    expected.translation.z += RAISED_M;
     let taken = Cell::new(0);
     let mut finder = ModelFinder::new(model, camera, Counted(&taken));
     let found = finder.find_nearest(&mut cell, &expected).unwrap().unwrap();
