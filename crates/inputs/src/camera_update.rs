@@ -94,10 +94,10 @@ mod tests {
         let good = PinholeCamera::symmetric(640, 480, 400.0);
         let folding = PinholeCamera { lens: PlumbBob { k1: -1.5, ..PlumbBob::NONE }, ..good };
         // An estimate's name does not remain.
-        fs::write(&path, without_pose(UNCALIBRATED.to_owned(), good).to_yaml()).unwrap();
-        CameraUpdate::read(&path).unwrap().write(good, None).unwrap();
-        assert!(!fs::read_to_string(&path).unwrap().contains(UNCALIBRATED));
-        fs::remove_file(&path).unwrap();
+        let estimated = folder.path().join("estimated.yaml");
+        fs::write(&estimated, without_pose(UNCALIBRATED.to_owned(), good).to_yaml()).unwrap();
+        CameraUpdate::read(&estimated).unwrap().write(good, None).unwrap();
+        assert!(!fs::read_to_string(&estimated).unwrap().contains(UNCALIBRATED));
         let refusal = || format!("{:#}", CameraUpdate::read(&path).unwrap().write(folding, None).unwrap_err());
         let error = refusal();
         assert!(error.contains("fold the picture") && !path.exists(), "{error}");

@@ -304,9 +304,20 @@ mod tests {
         let at_first = |spring_n: f64| if spring_n > 0.0 { 0.0 } else { 3.1 };
         let touched = descend(TouchDown::default(), at_first);
         assert!(!touched.is_contact && touched.peak_n > TouchDown::default().contact_n, "{touched:?}");
+        // A single estimate is none, either.
+        let mut descent = Descent::new(TouchDown::default(), &ArmGeometry::panda(), ready_pose(), JointVector::zeros());
+        descent.enter(Phase::Down);
+        for force_n in [3.1, 3.1, 0.0] {
+            descent.next(&ArmGeometry::panda(), &ready_pose(), &JointVector::zeros(), force_n);
+        }
+        assert!(descent.phase == Phase::Down && !descent.is_contact, "{descent:?}");
         // The arm is held at the end of the checked path: the reference stays there.
-        let ended = descended(TouchDown { max_way_m: 0.0, ..TouchDown::default() }, at_first);
-        assert!(ended.is_contact && ended.down_m <= 0.0, "{ended:?}");
+        let at_end = TouchDown { max_way_m: 0.0, ..TouchDown::default() };
+        let mut descent = Descent::new(at_end, &ArmGeometry::panda(), ready_pose(), JointVector::zeros());
+        descent.enter(Phase::Pressing);
+        descent.is_contact = true;
+        descent.next(&ArmGeometry::panda(), &ready_pose(), &JointVector::zeros(), 0.0);
+        assert!(descent.down_m <= 0.0, "{descent:?}");
     }
 
     /// The reference moves until the measured force is the requested one.

@@ -240,7 +240,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             return Ok(());
         }
         let below_mm = (aim.base_from_tcp.translation.z - aim.soft_m - touched.tcp_height_m) * 1e3;
-        let why = if below_mm < 0.0 {
+        let why = if below_mm <= -0.5 {
             format!("a contact {:.0} mm above the place did not last; the part is still held", -below_mm)
         } else {
             format!("no contact was measured down to {below_mm:.0} mm below the place; the part is still held")

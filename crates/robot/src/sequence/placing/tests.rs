@@ -192,14 +192,14 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
 }
 
-/// Finds the part; planning with this picture takes longer than [`MAX_AGE`].
+/// Finds the part; planning with this picture takes a second longer than [`MAX_AGE`], which is too long.
 struct SlowlyPlanned(Option<Instant>);
 
 const MAX_AGE: Duration = Duration::from_millis(50);
 
 impl PartFinder<Cell> for SlowlyPlanned {
     fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
-        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(10));
+        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(1010));
         Truth.find(cell)
     }
 
