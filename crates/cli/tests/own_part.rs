@@ -59,3 +59,20 @@ fn what_the_photo_does_not_show_must_be_told() {
     refused(&["--length-mm", "1600", "--height-mm", "16"], 1, &["opening of the jaws in m: expected 0.001 to 0.08"]);
     refused(&["--length-mm", "166", "--height-mm", "1"], 1, &["height in m: expected 0.003 to 0.12, found 0.0010"]);
 }
+
+#[test]
+fn another_height_than_the_model_s_is_refused() {
+    let folder = Folder::new();
+    let (model, camera) = (folder.path("model.sdg"), folder.text("wrist.yaml", include_str!("wrist.yaml")));
+    taught_pendulum(&model, Some(camera.as_ref()));
+    let refused = |arguments: &[&str], code: i32, part: &str| {
+        let output =
+            sdg(&[&["rehearse", "--grasp-model", &model, "--out", &folder.path("report")], arguments].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+    };
+    refused(&["--height-mm", "20"], 2, "whose marks are 16.0 mm above the table");
+    // The same height is accepted: the next error is that of the mass.
+    refused(&["--height-mm", "16", "--mass-g", "0.01"], 1, "mass in kg");
+}
