@@ -167,7 +167,7 @@ impl Workcell {
             .map_err(|error| SimulationError::Robot(error.to_string()))?;
         let margin_m = PlanOptions::default().margin_m;
         let mut checker = Checker::new(&model, margin_m);
-        // Without obstacles, motions are not planned, and starts may not depend on the planner.
+        // Without obstacles nothing is planned, and the starts of stored attempts stay the same.
         let mut is_free = |q: &JointVector| config.obstacles.is_empty() || checker.is_free(q);
         for _ in 0..NUM_TRIES {
             let offset = JointVector::from_fn(|joint, _| rng.random_range(-SPREAD_RAD[joint]..SPREAD_RAD[joint]));

@@ -241,7 +241,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let output = bash.wait_with_output()?;
     let printed = String::from_utf8_lossy(&output.stdout);
     if !output.status.success() {
-        // The jobs that were submitted before.
+        // The jobs that were submitted before the error.
         eprint!("{printed}");
         bail!(
             "the script that hands units to Slurm ended with {}: check that sbatch is installed and Slurm is running",

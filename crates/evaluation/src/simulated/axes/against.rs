@@ -191,7 +191,7 @@ pub fn difference_tables(comparisons: &[RunDifference], against: &str) -> Vec<Ti
                        the difference is Newcombe's for paired fractions (1998, method 10), 95 %: a difference is shown if it \
                        excludes zero. Cases needed: number of cases that shows a difference of this size with 80 % power at the 5 % \
                        level, two-sided, by McNemar's test (Connor, 1987). Instances of one picture are counted as if they \
-                       were independent."
+                       were independent. Without a model, every instance counts as missed."
                     .to_owned(),
                 table: rows.into_iter().fold(header(), |table, comparison| table.row(comparison.row())),
             })
