@@ -139,3 +139,46 @@ fn packages_are_not_built_without_git() {
     );
     assert_eq!(found.matches("packages: expected a git clone").count(), 5, "{found}");
 }
+
+#[test]
+fn jobs_of_another_cluster_are_not_cancelled() {
+    // Everything after the daemon of munge fails.
+    let found = bash(
+        "id() { echo 0; }
+        dpkg() { echo amd64; }
+        dpkg-query() { echo installed amd64; }
+        munged() { echo munged; return 1; }
+        squeue() { echo 7; }
+        scancel() { echo cancelled $*; }
+        sleep() { :; }
+        export -f id dpkg dpkg-query munged squeue scancel sleep
+        export CARGO_TARGET_DIR=$1 SDG=/bin/true
+        ! scripts/test-slurm.sh 2>&1",
+    );
+    assert_eq!(found, "munged\n");
+}
+
+#[test]
+fn no_programs_are_not_equal_programs() {
+    // Each program contains the name of its folder, unless `same` is given.
+    let found = bash(
+        "git() { :; }
+        tar() { :; }
+        cargo() {
+            mkdir -p $CARGO_TARGET_DIR/release
+            cd $CARGO_TARGET_DIR/release
+            for name in $programs; do pwd >$name; chmod +x $name; done
+            [ -z \"$same\" ] || echo $same >sdg-bench
+        }
+        export -f git tar cargo
+        export TMPDIR=$1 programs same
+        ! programs= same= scripts/reproducible.sh 2>&1
+        ! programs=sdg-bench same= scripts/reproducible.sh 2>&1 | tail -n 1
+        programs='sdg-bench sdg-0123456789abcdef' same=bytes scripts/reproducible.sh 2>&1 | tail -n 1",
+    );
+    let lines: Vec<&str> = found.lines().collect();
+    let [none, differing, equal] = lines[..] else { panic!("{found}") };
+    assert!(none.ends_with("expected programs of cargo build --package sdg-fci --example hand_checks, found none"));
+    assert!(differing.contains("expected equal files"), "{found}");
+    assert!(equal.contains("reproducible: equal"), "{found}");
+}

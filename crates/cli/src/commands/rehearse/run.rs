@@ -120,6 +120,11 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
              mm long"
         ))
         .into(),
+        Some(OwnPartError::HeightIsKnown { known_mm }) => Usage(format!(
+            "--height-mm: expected a model taught without --camera, found {model_file}, whose marks are {known_mm:.1} \
+             mm above the table"
+        ))
+        .into(),
         _ => error,
     })
 }
