@@ -111,22 +111,50 @@ fn an_old_compiler_is_told() {
     assert!(found.contains(concat!("expected Rust ", env!("CARGO_PKG_RUST_VERSION"))), "{found}");
 }
 
+/// A Python of version `$version` for [`bash`] that makes environments of programs without effect.
+const PYTHON: &str = "python3() {
+        case $1 in
+        -V) echo Python $version ;;
+        -m)
+            mkdir -p $3/bin
+            for program in python pip cargo-zigbuild; do ln -sf /bin/true $3/bin/$program; done
+            echo $3 made for $version
+            ;;
+        esac
+    }
+    export -f python3
+    export version\n";
+
+/// The last components of the environments in an output, with their versions.
+fn made(found: &str) -> Vec<&str> {
+    found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect()
+}
+
 #[test]
 fn an_environment_is_made_again_for_another_python_or_folder() {
-    let found = bash(
-        "python3() {
-            case $1 in
-            -V) echo Python $version ;;
-            -m) mkdir -p $3/bin; ln -s /bin/true $3/bin/python; ln -s /bin/true $3/bin/pip; echo $3 made for $version ;;
-            esac
-        }
-        export -f python3
-        for version in 3.11 3.11 3.12; do version=$version scripts/python/venv.sh $1/first a==1; done
+    let found = bash(&format!(
+        "{PYTHON}for version in 3.11 3.11 3.12; do scripts/python/venv.sh $1/first a==1; done
         mv $1/first $1/second
-        version=3.12 scripts/python/venv.sh $1/second a==1",
-    );
-    let made: Vec<&str> = found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect();
-    assert_eq!(made, ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
+        scripts/python/venv.sh $1/second a==1"
+    ));
+    assert_eq!(made(&found), ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
+}
+
+#[test]
+fn the_environment_of_zig_is_made_again_and_leaves_the_compiled_tools() {
+    // The compiler has every target.
+    let found = bash(&format!(
+        "{PYTHON}cp -r scripts $1
+        cd $1
+        export CARGO=true
+        rustc() {{ echo .; }}
+        triple=machine
+        mkdir -p lib/rustlib/$triple target/packages/tools/bin
+        ln -s /bin/true target/packages/tools/bin/cargo-auditable
+        for version in 3.11 3.11 3.12; do (source scripts/packages/zig.sh); done
+        [ -x target/packages/tools/bin/cargo-auditable ]"
+    ));
+    assert_eq!(made(&found), ["zig made for 3.11", "zig made for 3.12"]);
 }
 
 #[test]

@@ -132,7 +132,7 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
 /// A place in the workcell file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
-    robots::check_table_height(&workcell, path)?;
+    robots::check_simulated(&workcell, path)?;
     Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 
