@@ -175,6 +175,11 @@ impl GraspModel {
         self.demonstrations[0].check().search.scales.clone()
     }
 
+    /// The range of a part's size in held-out samples, relative to the photo: sizes at which it is accepted.
+    pub fn held_out_sizes(&self) -> RangeInclusive<f64> {
+        if self.facts.lengths.is_some() { CheckConfig::KNOWN_SAMPLE_SIZES } else { self.size_tolerance() }
+    }
+
     pub(crate) fn with_check(self, change: impl Fn(&mut CheckConfig)) -> Result<Self> {
         let changed = |demonstration: TaughtDemonstration| {
             let mut check = demonstration.check().clone();
