@@ -334,10 +334,10 @@ impl GraspModel {
 
     /// The verdict's inputs for a sighting.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
-        let PlacedDemonstration { demonstration_idx, evidence, log_size, .. } = sighting.placed;
+        let PlacedDemonstration { demonstration_idx, evidence, image_from_cutout, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
         let resemblance = self.score_calibration.resemblance;
-        Clues { demonstration_idx, evidence, log_size, network, resemblance }
+        Clues { demonstration_idx, evidence, log_size: image_from_cutout.scale.ln(), network, resemblance }
     }
 
     /// The scores of all sightings in one picture of a sequence. `earlier_log_sizes` are the sizes of parts in earlier

@@ -288,9 +288,9 @@ impl Track {
         self.part.demonstration_idx
     }
 
-    /// ln of the part's size over the nearest nominal size, smoothed over frames.
+    /// [`crate::verdict::Clues::log_size`], smoothed over frames.
     pub(super) fn log_size(&self) -> f64 {
-        self.part.log_size(self.steady_scale)
+        self.steady_scale.ln()
     }
 
     /// The first effort of refinement in a frame.
@@ -318,7 +318,6 @@ impl Track {
             colors: self.part.colors,
             agreement: followed.agreement,
             evidence: Evidence { close, ..followed.evidence },
-            log_size: followed.log_size,
             light: followed.light,
         };
         Sighting {
