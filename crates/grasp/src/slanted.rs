@@ -426,6 +426,28 @@ mod tests {
         }
     }
 
+    /// A similarity does not describe the shortened plate, so that only the search has its outline and its grasp.
+    #[cfg(feature = "teach")]
+    #[test]
+    fn a_tracked_plate_at_rest_stays_where_the_search_has_it() {
+        use crate::tracking::{Tracker, TrackerConfig};
+        use std::{sync::Arc, time::Duration};
+
+        let slant = slant(30.0);
+        let seen = Arc::new(picture(|seen| slant.level_from_picture(seen)));
+        let mut tracker = Tracker::new(plate_model().into(), TrackerConfig::default());
+        tracker.frame(Arc::clone(&seen), Duration::ZERO);
+        let search = tracker.search_before_answer().unwrap();
+        let found = tracker.answer(search.run()).unwrap().swap_remove(0).detection;
+        assert!(is_plate(&found, &slant, &Isometry2::identity(), 2.0), "{found:?}");
+        for number in 1..4 {
+            let parts = tracker.frame(Arc::clone(&seen), Duration::from_millis(100 * number));
+            assert!(tracker.search_before_answer().is_none(), "the frame continues the one before");
+            let followed = &parts[0].detection;
+            assert_eq!((followed.grasp, &followed.outline), (found.grasp, &found.outline), "frame {number}");
+        }
+    }
+
     #[test]
     fn places_far_apart_tell_the_lens() {
         let usual_px = 700.0;

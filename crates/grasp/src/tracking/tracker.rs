@@ -402,7 +402,7 @@ impl Tracker {
         let output = |track: &Track, refined: &Refined, (score, evidence), size: [u32; 2]| {
             let sighting = track.sighting(&detector, &refined.followed, refined.close);
             let detection = sighting.detection(score, evidence, detector.model().num_keypoints());
-            shown_within(&detector, detection, size)
+            shown_within(&detector, track.where_held(&refined.followed, detection), size)
         };
         let size = self.frames.newest().map_or([0, 0], |newest| detector.frame_size(&newest.picture));
         for ((tracked, refined), verdict) in self.tracks.iter_mut().zip(refined.iter()).zip(verdicts) {
