@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::CameraOverTable;
-use sdg_ros2::dds::{Node, Qos};
+use sdg_ros2::dds::{Node, Qos, network_thread};
 use sdg_ros2::messages::{CameraInfo, Header, TfMessage};
 use sdg_ros2::{RosError, Transforms, camera_info};
 
@@ -63,7 +63,7 @@ impl CameraPoseReader {
             let read = camera_info::read_camera_info(&received.message);
             lock(known).sent = Some(read.as_ref().copied().map_err(ToString::to_string));
             read.map(drop)
-        });
+        })?;
         if let CameraPoseSource::Transforms { .. } = reader.source {
             for (topic, qos, is_static) in
                 [("/tf", Qos::TRANSFORMS, false), ("/tf_static", Qos::STATIC_TRANSFORMS, true)]
@@ -79,21 +79,26 @@ impl CameraPoseReader {
                             why: format!("{num_refused} transforms on {topic} are invalid"),
                         }),
                     }
-                });
+                })?;
             }
         }
         Ok(reader)
     }
 
-    fn spawn(&mut self, lines: &Arc<Lines>, receive: impl Fn(&Mutex<Known>) -> Result<(), RosError> + Send + 'static) {
+    fn spawn(
+        &mut self,
+        lines: &Arc<Lines>,
+        receive: impl Fn(&Mutex<Known>) -> Result<(), RosError> + Send + 'static,
+    ) -> Result<(), RosError> {
         let (known, is_stopped, lines) = (Arc::clone(&self.known), Arc::clone(&self.is_stopped), Arc::clone(lines));
-        self.threads.push(std::thread::spawn(move || {
+        self.threads.push(network_thread("camera pose", move || {
             while !is_stopped.load(Ordering::SeqCst) {
                 if let Err(error) = receive(&known) {
                     lines.complain(&error.to_string());
                 }
             }
-        }));
+        })?);
+        Ok(())
     }
 
     /// The camera and its pose above the table at the time of a picture; `None` for [`CameraPoseSource::Unknown`].

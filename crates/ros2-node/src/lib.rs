@@ -29,7 +29,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_ros2::dds::{Node, TrajectoryArm};
+use sdg_ros2::dds::{Node, TrajectoryArm, network_panic};
 
 pub use camera_pose::CameraPoseSource;
 pub use grasping::GraspInputs;
@@ -51,8 +51,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Runs the node until `is_interrupted` returns true.
 ///
 /// # Errors
-/// An error if a network resource cannot be opened, or if the system's clock was set back; received data never ends the
-/// node.
+/// An error if a network resource cannot be opened, if the system's clock was set back, or if a thread of the network
+/// panicked.
 pub fn run(
     mut node: Node,
     settings: Settings,
@@ -70,7 +70,7 @@ pub fn run(
     let mut services = Services::open(&mut node, teach, trigger, needs_lengths, grasping, &lines)?;
     let mut searcher = Searcher::new(settings.model, settings.min_score, needs_lengths);
     eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
-    while !is_interrupted() && reader.shared.ended.get().is_none() {
+    while !is_interrupted() && reader.shared.ended.get().is_none() && network_panic().is_none() {
         if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
             let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);
             match over_table.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
@@ -95,7 +95,7 @@ pub fn run(
         topics.diagnose(&reader, searcher.model().is_some());
     }
     services.finish();
-    match reader.shared.ended.get() {
+    match reader.shared.ended.get().map(ToString::to_string).or_else(|| network_panic().map(|why| why.to_string())) {
         Some(why) => anyhow::bail!("{why}"),
         None => Ok(()),
     }

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use image::RgbImage;
-use sdg_ros2::dds::{Node, Qos, Received, Subscription, stamp_or_now};
+use sdg_ros2::dds::{Node, Qos, Received, Subscription, network_thread, stamp_or_now};
 use sdg_ros2::messages::{CompressedImage, Header, Image, Message};
 use sdg_ros2::{PictureError, RosError, encoding};
 
@@ -101,13 +101,13 @@ impl PictureReader {
         lines: &Arc<Lines>,
     ) -> Result<Self, RosError> {
         if is_compressed {
-            Ok(Self::spawn(node.subscribe("image/compressed", qos)?, queue, lines, |message: &CompressedImage| {
+            Self::spawn(node.subscribe("image/compressed", qos)?, queue, lines, |message: &CompressedImage| {
                 (message.header.clone(), encoding::read_compressed(message))
-            }))
+            })
         } else {
-            Ok(Self::spawn(node.subscribe("image", qos)?, queue, lines, |message: &Image| {
+            Self::spawn(node.subscribe("image", qos)?, queue, lines, |message: &Image| {
                 (message.header.clone(), encoding::read_image(message))
-            }))
+            })
         }
     }
 
@@ -116,7 +116,7 @@ impl PictureReader {
         queue: usize,
         lines: &Arc<Lines>,
         read: fn(&T) -> (Header, Result<RgbImage, PictureError>),
-    ) -> Self {
+    ) -> Result<Self, RosError> {
         let shared = Arc::new(Shared {
             kept: Mutex::default(),
             changed: Condvar::new(),
@@ -127,7 +127,7 @@ impl PictureReader {
         });
         let topic = subscription.topic().to_owned();
         let (writer, lines) = (Arc::clone(&shared), Arc::clone(lines));
-        let thread = std::thread::spawn(move || {
+        let receive = move || {
             while !writer.is_stopped.load(Ordering::SeqCst) {
                 let received = subscription.receive(POLL_INTERVAL);
                 writer.counts.lost.store(subscription.num_lost(), Ordering::Relaxed);
@@ -144,8 +144,9 @@ impl PictureReader {
                     }
                 }
             }
-        });
-        Self { shared, topic, thread: Some(thread) }
+        };
+        let thread = network_thread("pictures", receive)?;
+        Ok(Self { shared, topic, thread: Some(thread) })
     }
 }
 

@@ -77,7 +77,7 @@ impl TrajectoryArm {
         let gripper = node.action_client(&config.gripper_action, grip).map_err(unreachable)?;
         node.wait_for_server(&motions, timeout).map_err(unreachable)?;
         node.wait_for_server(&gripper, timeout).map_err(unreachable)?;
-        let states = StateReader::spawn(states, &config);
+        let states = StateReader::spawn(states, &config).map_err(unreachable)?;
         let arm =
             Self { states, motions, gripper, config, commanded: None, hand: None, grasped_m: None, num_feedback: 0 };
         let deadline = Instant::now() + timeout;

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 use nalgebra::SVector;
 use sdg_robot::ArmGeometry;
 
+use super::panics::network_thread;
 use super::topic::Subscription;
+use crate::error::RosError;
 use crate::messages::JointState;
 
 pub(super) type Joints = SVector<f64, 7>;
@@ -67,20 +69,20 @@ pub(super) struct StateReader {
 }
 
 impl StateReader {
-    pub(super) fn spawn(states: Subscription<JointState>, config: &ArmConfig) -> Self {
+    pub(super) fn spawn(states: Subscription<JointState>, config: &ArmConfig) -> Result<Self, RosError> {
         let known = Arc::<Mutex<Option<Known>>>::default();
         let is_stopped = Arc::<AtomicBool>::default();
         let (shared, stop, config, topic) =
             (Arc::clone(&known), Arc::clone(&is_stopped), config.clone(), states.topic().to_owned());
-        let thread = std::thread::spawn(move || {
+        let thread = network_thread("joint states", move || {
             while !stop.load(Ordering::SeqCst) {
                 // Malformed messages are skipped; missing states are reported by the functions that read the states.
                 let Ok(Some(received)) = states.receive(Duration::from_millis(100)) else { continue };
                 let mut known = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 *known = merged(*known, &received.message, received.arrived, &config).or(*known);
             }
-        });
-        Self { known, is_stopped, thread: Some(thread), topic }
+        })?;
+        Ok(Self { known, is_stopped, thread: Some(thread), topic })
     }
 
     pub(super) fn latest(&self) -> Option<Known> {

@@ -15,6 +15,7 @@ use ros2_client::{
 use super::action::{ActionClient, ActionType};
 use super::action_server::ActionServer;
 use super::failure::network;
+use super::panics::network_thread;
 use super::service::{Server, ServiceType};
 use super::topic::{Publisher, Qos, Subscription};
 use super::wait::wait_for;
@@ -133,10 +134,7 @@ impl Node {
         options = options.parameter_validator(Box::new(is_fixed));
         let mut node = context.new_node(name, options).map_err(|error| network("node", error))?;
         let spinner = node.spinner().map_err(|error| network("node", error))?;
-        let spinner = std::thread::Builder::new()
-            .name("ros2 node".to_owned())
-            .spawn(move || drop(wait_for(spinner.spin(), None)))
-            .map_err(|error| network("node", error))?;
+        let spinner = network_thread("node", move || drop(wait_for(spinner.spin(), None)))?;
         Ok(Self { node: Some(node), naming, rmw, spinner: Some(spinner) })
     }
 

@@ -29,7 +29,7 @@ MAX_GROWTH_MB = 128
 MAX_SEEDS_OF_A_KIND = 12
 EXTREMES = [0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFF_FFFF, 0xFFFF_FFFF, 0x7FFF_FFFF_FFFF_FFFF, 0xFFFF_FFFF_FFFF_FFFF]
 RTPS_HEADER = 20
-HEARTBEAT, GAP, DATA_FRAG = 0x07, 0x08, 0x16
+PAD, ACKNACK, HEARTBEAT, GAP, INFO_TS, NACK_FRAG, DATA_FRAG = 0x01, 0x06, 0x07, 0x08, 0x09, 0x12, 0x16
 MAX_NUMBERS = 100_000
 MAX_SAMPLE_BYTES = 16 << 20
 
@@ -40,8 +40,8 @@ def submessages(packet):
     while at + 4 <= len(packet):
         kind, flags = packet[at], packet[at + 1]
         (length,) = struct.unpack_from("<H" if flags & 1 else ">H", packet, at + 2)
-        # A length of 0 means "to the end of the packet".
-        end = at + 4 + length if length else len(packet)
+        # A length of 0 means "to the end of the packet", except for these two.
+        end = at + 4 + length if length or kind in (PAD, INFO_TS) else len(packet)
         found.append((kind, flags, packet[at + 4 : end]))
         at = end
     return found
@@ -106,17 +106,32 @@ def attack_packet(seeds, rng):
 
 def is_known(packet):
     """Whether the packet uses a known fault of RustDDS 0.15.1 (docs/testing.md): RustDDS stores each number between the
-    two of a heartbeat or a gap, and allocates a sample's announced size."""
+    two of a heartbeat or a gap, allocates a sample's announced size and as many bits as the number of a requested
+    fragment, and panics if that number is zero."""
     for kind, flags, content in submessages(packet):
         order = "<" if flags & 1 else ">"
         if kind in (HEARTBEAT, GAP) and len(content) >= 24:
             first_high, first_low, last_high, last_low = struct.unpack_from(order + "iIiI", content, 8)
-            if ((last_high - first_high) << 32) + last_low - first_low > MAX_NUMBERS:
+            if ((last_high - first_high) << 32) + last_low - first_low > MAX_NUMBERS or last_high == 0x7FFF_FFFF:
+                return True
+        if kind == NACK_FRAG and len(content) >= 24:
+            (base,) = struct.unpack_from(order + "I", content, 16)
+            if not 1 <= base <= MAX_NUMBERS:
                 return True
         if kind == DATA_FRAG and len(content) >= 32:
             if struct.unpack_from(order + "I", content, 28)[0] > MAX_SAMPLE_BYTES:
                 return True
     return False
+
+
+def with_nack_frag(packet, base):
+    """The packet with its ACKNACK as a NACK_FRAG for the fragment `base` of the first message; `None` if it has none."""
+    for kind, flags, content in submessages(packet):
+        if kind == ACKNACK and flags & 1:
+            request = content[:8] + struct.pack("<iIIIII", 0, 1, base, 1, 1 << 31, 1)
+            destined = [part for part in submessages(packet) if part[0] not in (ACKNACK, HEARTBEAT)]
+            return packet_of(packet[:RTPS_HEADER], [*destined, (NACK_FRAG, flags, request)])
+    return None
 
 
 def recorded(listener, prefix, seconds):
@@ -174,6 +189,9 @@ def attack(domain, count):
         time.sleep(0.1)
         kept[0]()
     seeds = recorded(listener, prefix, 3.0)
+    # Cyclone requests fragments only if some were lost.
+    requests = [(place, with_nack_frag(packet, 1)) for place, packet in seeds]
+    seeds += [request for request in requests if request[1]]
     kinds = sorted({f"{part[0]:#04x}" for _, packet in seeds for part in submessages(packet)})
     ports = {port for (_, port), _ in seeds}
     print(f"recorded {len(seeds)} packets to ports {sorted(ports)}, submessages {' '.join(kinds)}", flush=True)

@@ -11,7 +11,9 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use sdg_kinematics::ArmGeometry;
 use sdg_ros2::Naming;
-use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment};
+use sdg_ros2::dds::{
+    ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment, watch_network_threads,
+};
 use sdg_ros2_node::IsInterrupted;
 
 use crate::exit::{Outcome, Usage};
@@ -28,6 +30,7 @@ pub fn run(args: &Ros2Args) -> Result<Outcome> {
     let interrupt = Interrupt::watch();
     let settings = node_settings(args, &interrupt)?;
     let grasp = args.arm.allow_motion.then(|| grasp_settings(args)).transpose()?;
+    watch_network_threads();
     let mut node = Node::join(NodeConfig {
         naming,
         domain_id: args.ros.domain_id.map_or_else(domain_of_environment, Ok).map_err(Usage)?,
