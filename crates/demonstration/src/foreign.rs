@@ -41,7 +41,7 @@ pub(crate) fn passed_over(bytes: &[u8], image: &ImageFacts) -> Vec<String> {
     };
     let annotations = items("annotations")
         .into_iter()
-        .filter(|annotation| is_of_image(annotation) && is_foreign_annotation(annotation))
+        .filter(|annotation| is_foreign_annotation(annotation) && is_of_image(annotation))
         .map(|annotation| format!("{}: a crowd or a mask without keypoints", annotation.place));
     shapes.chain(annotations).collect()
 }
