@@ -21,7 +21,7 @@ GUARDS = [
     ("file or pipe: length while it is read", "crates/files/src/bounded.rs", "if bytes.len() as u64 > max_bytes {", "if bytes.len() as u64 > u64::MAX - 1 {", "sdg-files"),
     ("picture: pixels by its header", "crates/picture/src/decode.rs", "if u64::from(width) * u64::from(height) > limits.max_pixels {", "if u64::from(width) * u64::from(height) > u64::MAX - 1 {", "sdg-picture"),
     ("picture: pixels of a JPEG before it is completed", "crates/picture/src/decode.rs", "            if let Ok((width, height)) = header {\n                check_size(width, height, limits)?;\n            }", "            let _ = header;", "sdg-picture"),
-    ("picture: the decoder's memory", "crates/picture/src/decode.rs", "allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));", "allocation.max_alloc = None;", "sdg-picture"),
+    ("picture: the decoder's memory", "crates/picture/src/decode.rs", "allocation.max_alloc = Some(limits.max_bytes());", "allocation.max_alloc = None;", "sdg-picture"),
     ("PPM: pixels", "crates/picture/src/ppm.rs", "u64::from(width) * u64::from(height) <= MAX_PIXELS", "u64::from(width) * u64::from(height) <= u64::MAX", "sdg-picture"),
     ("PPM: sides", "crates/picture/src/ppm.rs", "let is_bounded = width <= MAX_SIDE && height <= MAX_SIDE && ", "let is_bounded = ", "sdg-picture"),
     ("PPM: head", "crates/picture/src/ppm.rs", "None if at > Self::MAX_BYTES", "None if at > usize::MAX - 1", "sdg-picture"),

@@ -6,6 +6,7 @@ use std::process::{Command, Output};
 
 use crate::support::{sdg, shipped};
 use serde_json::Value;
+use tempfile::TempDir;
 
 /// A file of another tool.
 fn foreign(name: &str) -> PathBuf {
@@ -71,6 +72,60 @@ fn yolo_pose_says_what_it_has_no_room_for() {
         &["data.yaml", "fuel_line", "rod_end"],
     );
     assert!(!other.exists());
+}
+
+/// The folders of a YOLO dataset with a photo.
+fn dataset() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for inner in ["images/train", "labels/train"] {
+        fs::create_dir_all(folder.path().join(inner)).unwrap();
+    }
+    fs::copy(shipped("fuel_line", "image.png"), folder.path().join("images/train/a.png")).unwrap();
+    folder
+}
+
+#[test]
+fn a_dataset_is_found_from_its_inner_folders() {
+    let folder = dataset();
+    let at = |name: &str| folder.path().join(name);
+    converted(&shipped("fuel_line", "annotation.json"), &at("labels/train/a.txt"), &[]);
+    fs::rename(at("labels/train/data.yaml"), at("data.yaml")).unwrap();
+    let run = |inner: &str, arguments: &[&str]| -> Value {
+        let mut sdg = Command::new(env!("CARGO_BIN_EXE_sdg"));
+        let done = sdg.args(arguments).arg("--json").current_dir(at(inner)).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    let convert = ["annotation", "convert", "a.txt", "a.json", "--image", "../../images/train/a.png"];
+    assert_eq!(run("labels/train", &convert)["objects"][0], "fuel_line");
+    let augment = ["augment", "--demo", "a.png", "--count", "1", "--out", "samples"];
+    assert_eq!(run("images/train", &augment)["label"], "fuel_line");
+}
+
+#[test]
+fn the_labels_of_a_dataset_are_not_shadowed() {
+    let folder = dataset();
+    let at = |name: &str| folder.path().join(name);
+    let (marks, labels) = (shipped("fuel_line", "annotation.json"), at("labels/train/a.txt"));
+    fs::write(at("data.yaml"), "names: [rod_end]\nkpt_shape: [2, 3]\n").unwrap();
+    assert_refused(&convert(&marks, &labels, &[]), 1, &["data.yaml", "fuel_line", "rod_end"]);
+    fs::write(at("data.yaml"), "names: [fuel_line]\nkpt_shape: [2, 3]\n").unwrap();
+    let line = converted(&marks, &labels, &[]);
+    assert_eq!(line["data_yaml"], at("data.yaml").to_str().unwrap());
+    assert_eq!(fs::read_dir(at("labels/train")).unwrap().count(), 1);
+}
+
+#[test]
+fn a_refused_output_leaves_no_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let [marks, photo] = ["a.json", "photo.png"].map(|name| folder.path().join(name));
+    fs::copy(shipped("fuel_line", "annotation.json"), &marks).unwrap();
+    fs::copy(shipped("fuel_line", "image.png"), &photo).unwrap();
+    let yolo = ["--format", "yolo-pose"];
+    assert_refused(&convert(&marks, &marks, &yolo), 2, &["an output file other than the input"]);
+    let with_image = [&yolo[..], &["--image", photo.to_str().unwrap()]].concat();
+    assert_refused(&convert(&marks, &photo, &with_image), 1, &["found an input of this command"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
 #[test]

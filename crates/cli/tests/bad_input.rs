@@ -301,3 +301,18 @@ fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let line: serde_json::Value = serde_json::from_slice(&taught.stdout).unwrap();
     assert!(line["failure"].is_string() && fs::metadata(&model).is_ok(), "{line}");
 }
+
+#[test]
+fn a_page_that_cannot_be_written_does_not_hide_the_result() {
+    let folder = Folder::new();
+    let [model, report] = ["model.sdg", "report"].map(|name| folder.path(name));
+    fs::create_dir_all(folder.path("report/index.html")).unwrap();
+    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
+    let teach = ["teach", "--model", "S", "--demo", &demonstration, "--out", &model, "--report", &report, "--json"];
+    let taught = sdg(&teach);
+    let said = String::from_utf8(taught.stderr).unwrap();
+    assert_eq!(taught.status.code(), Some(0), "{said}");
+    assert!(said.contains("--report: no page was written") && said.contains("index.html"), "{said}");
+    let line: serde_json::Value = serde_json::from_slice(&taught.stdout).unwrap();
+    assert!(line["held_back"].is_object() && line["report"].is_null(), "{line}");
+}

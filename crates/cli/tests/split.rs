@@ -177,6 +177,9 @@ fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
         assert!(error.contains(part), "expected {part} in: {error}");
     };
     refused(&measure, 1, "gone: expected the folder of set \"gone\"");
+    // Before the measurement, which would print more lines.
+    let notes = folder.text("notes.txt", "notes");
+    refused(&[&measure[..], &["--tuned", "--records", &notes]].concat(), 1, "or JSON to replace, found text");
     refused(&[&measure[..], &["--seeds", "1,1"]].concat(), 2, "found 1 again");
     refused(&measure[..3], 2, "--sets");
     refused(&[&measure[..], &["--pictures", &set]].concat(), 2, "--pictures");

@@ -341,8 +341,14 @@ mod tests {
             let mut file = full();
             file["annotations"].as_array_mut().unwrap().push(crowd);
             assert_eq!(read_named(&file, None).unwrap(), expected);
-            let told = Annotation::passed_over(file.to_string().as_bytes());
-            assert_eq!(told, ["annotations[1]: a crowd or a mask without keypoints"]);
+            let told = |file: &Value, file_name| {
+                Annotation::passed_over(file.to_string().as_bytes(), &ImageFacts { file_name, ..IMAGE })
+            };
+            assert_eq!(told(&file, None), ["annotations[1]: a crowd or a mask without keypoints"]);
+            // Another image of the file has no crowd.
+            file["images"].as_array_mut().unwrap().push(json!({"id": 7, "file_name": "other.png"}));
+            assert_eq!(told(&file, Some("a.png")).len(), 1);
+            assert!(told(&file, Some("other.png")).is_empty());
         }
     }
 

@@ -1,5 +1,7 @@
 //! Marks of other objects beside those of the part: they are skipped and reported.
 
+use crate::annotation::ImageFacts;
+use crate::coco_image::{choose_image, is_same_id};
 use crate::json::{self, Node, shorten};
 
 /// Whether a LabelMe shape is of a kind that marks no part: a circle, a line, a mask, a point of another name.
@@ -23,8 +25,8 @@ pub(crate) fn is_foreign_annotation(annotation: &Node) -> bool {
     (is_crowd || is_mask) && !has_keypoints
 }
 
-/// The skipped marks of a COCO or LabelMe file, in words.
-pub(crate) fn passed_over(bytes: &[u8]) -> Vec<String> {
+/// The skipped marks of an image in a COCO or LabelMe file, in words.
+pub(crate) fn passed_over(bytes: &[u8], image: &ImageFacts) -> Vec<String> {
     let Ok(value) = json::parse(bytes) else { return Vec::new() };
     let root = Node::root(&value);
     let items = |key: &str| root.optional(key).ok().flatten().and_then(|list| list.items().ok()).unwrap_or_default();
@@ -32,9 +34,14 @@ pub(crate) fn passed_over(bytes: &[u8]) -> Vec<String> {
         let text = |key: &str| shape.value.get(key).and_then(|value| value.as_str()).map(shorten).unwrap_or_default();
         format!("{}: a {} `{}`", shape.place, text("shape_type"), text("label"))
     });
+    let id = |of: &Node, key: &str| of.value.get(key).cloned();
+    let image_id = choose_image(&items("images"), image).ok().and_then(|chosen| id(&chosen, "id"));
+    let is_of_image = |annotation: &Node| {
+        image_id.as_ref().zip(id(annotation, "image_id")).is_some_and(|(chosen, own)| is_same_id(chosen, &own))
+    };
     let annotations = items("annotations")
         .into_iter()
-        .filter(is_foreign_annotation)
+        .filter(|annotation| is_foreign_annotation(annotation) && is_of_image(annotation))
         .map(|annotation| format!("{}: a crowd or a mask without keypoints", annotation.place));
     shapes.chain(annotations).collect()
 }

@@ -129,10 +129,10 @@ impl AnnotationFormat {
 }
 
 impl Annotation {
-    /// The skipped marks of a COCO or LabelMe file that mark no part, in words: circles, lines, masks, points of other
-    /// names, crowds.
-    pub fn passed_over(bytes: &[u8]) -> Vec<String> {
-        foreign::passed_over(bytes)
+    /// The skipped marks of an image in a COCO or LabelMe file that mark no part, in words: circles, lines, masks,
+    /// points of other names, crowds.
+    pub fn passed_over(bytes: &[u8], image: &ImageFacts) -> Vec<String> {
+        foreign::passed_over(bytes, image)
     }
 
     /// Reads every object that a file marks on the image; the content determines the [`AnnotationFormat`].

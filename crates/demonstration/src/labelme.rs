@@ -309,9 +309,9 @@ mod tests {
         }
         let text = file.to_string();
         assert_eq!(Annotation::read(text.as_bytes(), &IMAGE).unwrap(), expected);
-        let told = Annotation::passed_over(text.as_bytes());
+        let told = Annotation::passed_over(text.as_bytes(), &IMAGE);
         assert!(told.len() == 4 && told[0] == "shapes[0]: a point `hole`", "{told:?}");
-        assert!(Annotation::passed_over(full().to_string().as_bytes()).is_empty());
+        assert!(Annotation::passed_over(full().to_string().as_bytes(), &IMAGE).is_empty());
     }
 
     #[test]

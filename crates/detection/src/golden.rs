@@ -247,7 +247,7 @@ impl<'a> Comparer<'a> {
             let shape = [count, height as usize, width as usize];
             self.compare("detections.masks", &shape, &values, Tolerance::Pixels(1e-3));
         } else if let Some(expected) = self.reference.get("detections.masks") {
-            let shape: Vec<usize> = [&[0], &expected.shape[1..]].concat();
+            let shape: Vec<usize> = [&[0], expected.shape.get(1..).unwrap_or_default()].concat();
             self.compare("detections.masks", &shape, &[], Tolerance::Pixels(1e-3));
         }
     }
@@ -326,7 +326,7 @@ impl<'a> Comparer<'a> {
             let bitmap = |pixels: &[f32]| {
                 Mask::from_fn(width as u32, height as u32, |x, y| pixels[y as usize * width + x as usize] >= 0.5)
             };
-            return Ok(values.chunks_exact(height * width).map(|pixels| bitmap(pixels).into()).collect());
+            return Ok(values.chunks_exact((height * width).max(1)).map(|pixels| bitmap(pixels).into()).collect());
         }
         let Some(WeightTensor { values, .. }) = named("targets.polygons") else {
             return Err(DetectionError::Target {
@@ -338,7 +338,7 @@ impl<'a> Comparer<'a> {
         };
         let vertex = |xy: &[f32]| [f64::from(xy[0]), f64::from(xy[1])].into();
         let polygon = |row: &[f32]| Polygon { vertices: row.chunks_exact(2).map(vertex).collect() };
-        Ok(values.chunks_exact((values.len() / count).max(1)).map(|row| polygon(row).into()).collect())
+        Ok(values.chunks_exact((values.len() / count.max(1)).max(1)).map(|row| polygon(row).into()).collect())
     }
 
     /// The objects with which the reference was trained for one step.
@@ -391,6 +391,9 @@ impl<'a> Comparer<'a> {
             }),
             () if heads.keypoint_head.is_some() && target.keypoints.len() != count => {
                 Err(broken("targets.keypoints", target.keypoints.len()))
+            }
+            () if heads.mask_head.is_some() && target.masks.len() != count => {
+                Err(broken("targets.masks or targets.polygons", target.masks.len()))
             }
             () => Ok(target),
         }

@@ -185,6 +185,42 @@ fn a_whole_torchvision_network_agrees() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+/// A tensor's name, shape and values.
+type Named<'a> = (&'a str, &'a [usize], &'a [f32]);
+
+#[test]
+fn references_without_objects_and_of_other_shapes_do_not_panic() {
+    let text = std::fs::read_to_string(golden("detectron2/mask/config.json")).unwrap();
+    let mut config = RcnnConfig::from_json(&text).unwrap().without_sampling();
+    // Nothing is detected.
+    config.roi_heads.box_head.score_threshold = 1.0;
+    let detector = config.init(&Device::flex().autodiff(), 1).unwrap();
+    let image = image::open(golden("detectron2/input.png")).unwrap().to_rgb8();
+    let compared = |tensors: &[Named<'_>]| {
+        let tensor = |shape: &[usize], values: &[f32]| WeightTensor { shape: shape.to_vec(), values: values.to_vec() };
+        let reference: StateDict =
+            tensors.iter().map(|(name, shape, values)| ((*name).to_owned(), tensor(shape, values))).collect();
+        verify(&detector, &image, &reference)
+    };
+    assert!(!compared(&[("detections.masks", &[], &[0.0])]).unwrap().passed());
+    let loss: Named<'_> = ("losses.loss_mask", &[1], &[0.5]);
+    for (name, row) in [("targets.polygons", &[0][..]), ("targets.masks", &[0, 4][..])] {
+        let shape = |count: usize| [&[count], row].concat();
+        let (none, one) = (shape(0), shape(1));
+        let tensors: [Named<'_>; 4] =
+            [loss, ("targets.boxes", &[0, 4], &[]), ("targets.classes", &[0], &[]), (name, &none, &[])];
+        assert!(!compared(&tensors).unwrap().passed(), "the loss without objects is 0");
+        let tensors: [Named<'_>; 4] = [
+            loss,
+            ("targets.boxes", &[1, 4], &[10.0, 10.0, 60.0, 60.0]),
+            ("targets.classes", &[1], &[0.0]),
+            (name, &one, &[]),
+        ];
+        let refused = compared(&tensors).unwrap_err().to_string();
+        assert!(refused.contains("one per box") && refused.contains("targets.masks"), "{refused}");
+    }
+}
+
 #[test]
 fn another_weight_is_noticed() {
     let folder = golden("detectron2/faster");

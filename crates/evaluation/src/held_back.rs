@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use rayon::prelude::*;
 use sdg_cell::Perception;
 use sdg_demonstration::{
-    AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
+    AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle, sample_size,
 };
 use sdg_grasp::{GraspModel, TurnedGrasp, Verification, turned_grasps, without_unmarked_parts};
 use serde_json::{Value, json};
@@ -34,12 +34,10 @@ impl HeldBackSamples {
     pub fn new(demonstrations: &[Demonstration], sizes: &RangeInclusive<f64>, seed: u64) -> Result<Self> {
         let mut style = SceneStyle::default();
         style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
-        let (width, height) =
-            demonstrations.first().context("expected a demonstration, found none")?.image.dimensions();
-        let shrink = (MAX_PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
-        let side = |length: u32| (f64::from(length) * shrink).round() as u32;
+        let photo = demonstrations.first().context("expected a demonstration, found none")?.image.dimensions();
+        let [width, height] = sample_size(photo.into(), MAX_PIXELS);
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
-        let config = config.with_output_size(side(width), side(height));
+        let config = config.with_output_size(width, height);
         Ok(Self(Augmenter::new(demonstrations, config, seed)?))
     }
 
@@ -223,6 +221,9 @@ impl HeldBackFigures {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::RgbImage;
+    use sdg_demonstration::Annotation;
+    use sdg_geometry::{BoundingBox, GraspLine};
 
     fn figures(found: usize, false_alarms: usize) -> HeldBackFigures {
         let share = |count, of| Share { count, of };
@@ -243,5 +244,19 @@ mod tests {
         assert_eq!(figures(9, 3).failure(), None);
         assert!(figures(8, 0).failure().unwrap().contains("finds 8 of 18 parts"));
         assert!(figures(18, 4).failure().unwrap().contains("in 4 of 6 without the part"));
+    }
+
+    #[test]
+    fn a_photo_with_few_pixels_but_a_long_side_has_samples() {
+        let annotation = Annotation {
+            label: "part".into(),
+            bbox: BoundingBox { x1: 40.0, y1: 5.0, x2: 90.0, y2: 25.0 },
+            grasp: Some(GraspLine::new([50.0, 15.0].into(), [80.0, 15.0].into())),
+            jaw_width: None,
+            outline: None,
+        };
+        let demonstration = Demonstration { image: RgbImage::new(9000, 30), annotation };
+        let samples = HeldBackSamples::new(&[demonstration], &(0.75..=1.35), 1).unwrap();
+        assert_eq!(samples.0.output_size(), [8192, 27]);
     }
 }

@@ -101,7 +101,7 @@ impl TeachingPage<'_> {
     fn tried(&self) -> Result<Section> {
         // The part may be anywhere in a sample.
         let model = self.taught.model.clone().with_region(None)?;
-        // Samples have the photo's size, so that the part's size is in the searched range.
+        // Samples have the photo's size or shape, so that the part's size is in the searched range.
         let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
         let mut figures = Vec::new();
         for i in 0..TRIED {

@@ -1,6 +1,6 @@
 //! Folders and the names in them.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{FileError, Result};
@@ -37,20 +37,15 @@ pub(crate) fn folder_of(file: &Path) -> &Path {
     }
 }
 
-/// Checks that files can be written to an existing folder.
-pub(crate) fn check_folder_writable(folder: &Path) -> Result<()> {
-    let probe = folder.join(format!(".sdg-probe-{}.tmp", std::process::id()));
-    File::create_new(&probe).map_err(FileError::at(folder, "write into this folder"))?;
-    fs::remove_file(&probe).map_err(FileError::at(&probe, "remove a temporary file"))
-}
-
 /// Creates a folder (and its parents) if missing, and checks that files can be written to it.
 ///
 /// # Errors
 /// The folder cannot be created or written.
 pub fn prepare_folder(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).map_err(FileError::at(folder, "make this folder"))?;
-    check_folder_writable(folder)
+    // Its name is random: processes in two containers may have one id.
+    let probe = tempfile::Builder::new().prefix(".sdg-").suffix(".tmp").tempfile_in(folder);
+    probe.map(drop).map_err(FileError::at(folder, "write into this folder"))
 }
 
 #[cfg(test)]
@@ -62,11 +57,21 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("made/here");
         prepare_folder(&inner).unwrap();
+        assert!(fs::read_dir(&inner).unwrap().next().is_none());
         for name in ["b.PNG", ".hidden", "a.png"] {
             fs::write(inner.join(name), "").unwrap();
         }
         let found = entries(&inner).unwrap();
         assert_eq!(found, ["a.png", "b.PNG"].map(|name| inner.join(name)));
         assert!(found.iter().all(|path| has_extension(path, &["png"])));
+    }
+
+    #[test]
+    fn a_file_left_by_a_process_of_the_same_number_does_not_disturb() {
+        let folder = tempfile::tempdir().unwrap();
+        let left = folder.path().join(format!(".sdg-probe-{}.tmp", std::process::id()));
+        fs::write(&left, "").unwrap();
+        prepare_folder(folder.path()).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -7,7 +7,6 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::atomic::{AtomicFile, write_atomically};
 use crate::error::{FileError, Result};
-use crate::folder::{check_folder_writable, folder_of};
 use crate::kind::check_replaces_its_kind;
 
 /// Files opened for reading by this process: [`write`] does not replace them.
@@ -98,7 +97,8 @@ pub fn create(path: &Path, start: &[u8]) -> Result<AtomicFile> {
 /// Checks, before minutes of work, that a file can be written at `path` later, and that it is not an input.
 ///
 /// # Errors
-/// `path` is a folder or an input, or its folder cannot be written.
+/// `path` is a folder, a device, a pipe or an input, or its folder (that of the file to which a link leads) cannot be
+/// written.
 pub fn check_writable(path: &Path) -> Result<()> {
     check_extendable(path, None)
 }
@@ -112,7 +112,16 @@ pub fn check_extendable(path: &Path, own: Option<&Path>) -> Result<()> {
     if path.is_dir() {
         return Err(FileError::Folder { path: path.to_owned(), expected: "file to write" });
     }
-    check_folder_writable(folder_of(path))
+    AtomicFile::create(path).map(drop)
+}
+
+/// Like [`check_extendable`], for contents that begin with `start`: an existing file must be of the same kind.
+///
+/// # Errors
+/// The errors of [`check_writable`]; a file of another kind.
+pub fn check_replaceable(path: &Path, own: Option<&Path>, start: &[u8]) -> Result<()> {
+    check_extendable(path, own)?;
+    check_replaces_its_kind(path, start)
 }
 
 #[cfg(test)]
@@ -123,8 +132,25 @@ mod tests {
 
     #[test]
     fn a_folder_that_is_not_there_cannot_be_written() {
-        let error = check_writable(Path::new("/nowhere/at/all.sdg")).unwrap_err();
-        assert_eq!(error.to_string(), "/nowhere/at: cannot write into this folder");
+        let error = check_writable(Path::new("/nowhere/at/all.sdg")).unwrap_err().to_string();
+        assert!(error.starts_with("cannot write /nowhere/at/all.sdg: creating a temporary file"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn paths_that_a_later_write_refuses_are_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let [link, pipe] = ["link.sdg", "pipe.sdg"].map(|name| folder.path().join(name));
+        // Not even root may create files in this folder.
+        std::os::unix::fs::symlink("/proc/version", &link).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [link.as_path(), &pipe, Path::new("/dev/null"), folder.path()] {
+            check_writable(path).unwrap_err();
+            write(path, b"model").unwrap_err();
+        }
+        let free = folder.path().join("free.sdg");
+        check_writable(&free).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left");
     }
 
     #[test]
@@ -155,6 +181,9 @@ mod tests {
         fs::write(&camera, "image_width: 4\n").unwrap();
         for (path, found) in [(&photo, "found a picture (Png)"), (&marks, "found JSON"), (&camera, "found text")] {
             let before = fs::read(path).unwrap();
+            assert!(
+                check_replaceable(path, None, b"<svg/>").is_err() && check_replaceable(path, None, &before).is_ok()
+            );
             let error = write(path, b"<svg/>").unwrap_err().to_string();
             assert!(error.contains("or XML or HTML to replace") && error.contains(found), "{error}");
             assert_eq!(fs::read(path).unwrap(), before);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts};
 
-use crate::annotation_files::{AnnotationFile, write_data_yaml};
+use crate::annotation_files::{AnnotationFile, write_marks};
 use crate::error::ImageError;
 use crate::pictures::read_image;
 
@@ -36,7 +36,6 @@ pub fn convert_annotation(
     output: &Path,
     format: AnnotationFormat,
 ) -> Result<ConvertedAnnotation> {
-    sdg_files::check_writable(output)?;
     let file = AnnotationFile::read(input)?;
     let (declared, objects) = match image {
         Some(path) => marks_on(&file, path)?,
@@ -45,8 +44,7 @@ pub fn convert_annotation(
     let DeclaredImage { file_name, width, height } = &declared;
     let facts = ImageFacts { width: *width, height: *height, file_name: file_name.as_deref() };
     let written = format.write(&facts, &objects)?;
-    let data_yaml = write_data_yaml(output, &written, &facts, &objects)?;
-    sdg_files::write(output, written.text.as_bytes())?;
+    let data_yaml = write_marks(output, &written, &facts, &objects)?;
     let labels = objects.into_iter().map(|object| object.label).collect();
     Ok(ConvertedAnnotation {
         input_format: file.format,
@@ -75,6 +73,6 @@ fn declared_marks(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, 
     let DeclaredImage { file_name, width, height } = &declared;
     let facts = ImageFacts { width: *width, height: *height, file_name: file_name.as_deref() };
     let objects = file.objects(&facts)?;
-    file.report_skipped();
+    file.report_skipped(&facts);
     Ok((declared, objects))
 }

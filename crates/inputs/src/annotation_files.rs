@@ -66,13 +66,14 @@ impl AnnotationFile {
         let objects = marked.checked(|facts| self.objects(facts))?;
         objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
         // After all fallible steps, so that an error is printed alone.
-        self.report_skipped();
+        let (width, height) = image.dimensions();
+        self.report_skipped(&ImageFacts { width, height, file_name: path.to_str() });
         Ok(objects)
     }
 
-    /// Prints the entries of the file that do not mark a part.
-    pub fn report_skipped(&self) {
-        for foreign in Annotation::passed_over(&self.bytes) {
+    /// Prints the entries for an image that do not mark a part.
+    pub fn report_skipped(&self, image: &ImageFacts) {
+        for foreign in Annotation::passed_over(&self.bytes, image) {
             eprintln!("{}: skipped {foreign}", self.path.display());
         }
     }
@@ -90,7 +91,7 @@ impl AnnotationFile {
 /// # Errors
 /// No such file exists. The message lists the searched names and how to create one.
 pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
-    let in_labels = || {
+    let in_labels = |photo: &Path| {
         let folder = photo.parent()?;
         let mut parts: Vec<_> = folder.components().map(|part| part.as_os_str()).collect();
         let images = parts.iter().rposition(|part| *part == "images")?;
@@ -101,7 +102,8 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     let looked_for: Vec<PathBuf> = ["coco.json", "json", "txt"]
         .map(|extension| photo.with_extension(extension))
         .into_iter()
-        .chain(in_labels())
+        // The current folder may be `images` or below it.
+        .chain(in_labels(photo).or_else(|| in_labels(&from_root(photo))))
         .collect();
     match looked_for.iter().find(|path| path.is_file()) {
         Some(found) => Ok(found.clone()),
@@ -115,6 +117,26 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
             )
         }
     }
+}
+
+/// The path from the root. `.` and `..` at its beginning are replaced; the names after them, also those of links, are
+/// kept.
+fn from_root(path: &Path) -> PathBuf {
+    let start = path.ancestors().find(|start| start.file_name().is_none()).unwrap_or(path);
+    let folder = if start.as_os_str().is_empty() { Path::new(".") } else { start };
+    match (folder.canonicalize(), path.strip_prefix(start)) {
+        (Ok(folder), Ok(rest)) => folder.join(rest),
+        _ => path.to_owned(),
+    }
+}
+
+/// The folder of a file and the folders above it. The names in the path are kept; folders above them have their path
+/// from the root.
+fn folders_above(path: &Path) -> Vec<PathBuf> {
+    let named = path.ancestors().skip(1).take_while(|folder| folder.file_name().is_some()).count() + 1;
+    let above = from_root(path);
+    let above = above.ancestors().skip(1 + named);
+    path.ancestors().skip(1).take(named).chain(above).map(Path::to_owned).collect()
 }
 
 /// The second file that [`AnnotationFile::read`] reads for this annotation file; `None` if there is none, or if the
@@ -138,31 +160,42 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
         }
         AnnotationFormat::YoloPose => {
             let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
-            let folders = path.ancestors().skip(1).take(MAX_PARENT_FOLDERS);
-            folders.flat_map(|folder| names().map(|name| folder.join(name))).find(|file| file.exists())
+            let folders = folders_above(path).into_iter().take(MAX_PARENT_FOLDERS);
+            folders.flat_map(|folder| names().map(move |name| folder.join(name))).find(|file| file.exists())
         }
         _ => None,
     }
 }
 
-/// Writes the labels beside the output and returns the path of their file; `None` if the format has no such file. An
-/// existing data.yaml is kept.
+/// Writes the marks, and their labels beside them if the format has them in a second file and readers of the output
+/// would find none. Returns the path of the file with the labels.
 ///
 /// # Errors
-/// An existing file contradicts the labels, or files cannot be read or written.
-pub fn write_data_yaml(
+/// An existing file contradicts the labels (then nothing is written), or files cannot be read or written.
+pub fn write_marks(
     output: &Path,
     written: &WrittenAnnotation,
     image: &ImageFacts,
     objects: &[Annotation],
 ) -> Result<Option<PathBuf>> {
-    let Some(text) = &written.data_yaml else { return Ok(None) };
-    let path = output.with_file_name(DATA_YAML);
-    if !path.exists() {
-        sdg_files::write(&path, text.as_bytes())?;
-        return Ok(Some(path));
+    let existing = written.data_yaml.as_ref().and_then(|_| beside(output, AnnotationFormat::YoloPose));
+    if let Some(path) = &existing {
+        check_labels(path, written, image, objects)?;
     }
-    let there = sdg_files::read(&path, MAX_ANNOTATION_BYTES)?;
+    sdg_files::write(output, written.text.as_bytes())?;
+    match &written.data_yaml {
+        Some(text) if existing.is_none() => {
+            let path = output.with_file_name(DATA_YAML);
+            sdg_files::write(&path, text.as_bytes())?;
+            Ok(Some(path))
+        }
+        _ => Ok(existing),
+    }
+}
+
+/// Checks that an existing file gives these objects their labels.
+fn check_labels(path: &Path, written: &WrittenAnnotation, image: &ImageFacts, objects: &[Annotation]) -> Result<()> {
+    let there = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
     let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
         .with_context(|| path.display().to_string())?;
     for (found, expected) in read.iter().zip(objects) {
@@ -176,7 +209,7 @@ pub fn write_data_yaml(
             );
         }
     }
-    Ok(Some(path))
+    Ok(())
 }
 
 #[cfg(test)]
@@ -214,6 +247,9 @@ mod tests {
         assert_eq!(found("kps_train.npy", AnnotationFormat::OpenDr), Some(at("boxes_train.npy")));
         assert_eq!(found("boxes_val.npy", AnnotationFormat::OpenDr), None);
         assert_eq!(found("labels/train/a.txt", AnnotationFormat::YoloPose), Some(at(DATA_YAML)));
+        // `..` leads upwards, although its parent in the path is below.
+        let above = folder.path().canonicalize().unwrap().join(DATA_YAML);
+        assert_eq!(found("labels/train/../train/a.txt", AnnotationFormat::YoloPose), Some(above));
         assert_eq!(found("labels/train/a.json", AnnotationFormat::Coco), None);
     }
 }

@@ -24,6 +24,13 @@ impl Default for ImageLimits {
     }
 }
 
+impl ImageLimits {
+    /// Maximum number of bytes of the decoded pixels: 8 per pixel, as for 16-bit RGBA.
+    fn max_bytes(&self) -> u64 {
+        self.max_pixels.saturating_mul(8).saturating_add(1 << 20)
+    }
+}
+
 /// Orientation of the decoded pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PixelFrame {
@@ -100,8 +107,8 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
             if let Ok((width, height)) = header {
                 check_size(width, height, limits)?;
             }
-            let jpeg = jpeg::complete_jpeg(bytes)?;
-            jpeg_gap::check_has_no_gap(&jpeg)?;
+            let jpeg = jpeg::complete_jpeg(bytes, limits.max_bytes())?;
+            jpeg_gap::check_has_no_gap(&jpeg, limits.max_bytes())?;
             jpeg
         }
         ImageFormat::Tiff => {
@@ -115,8 +122,7 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
     let mut allocation = Limits::default();
-    // 8 bytes per pixel, as for 16-bit RGBA.
-    allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
+    allocation.max_alloc = Some(limits.max_bytes());
     decoder.set_limits(allocation).map_err(damaged)?;
     // A damaged Exif block is ignored.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
@@ -290,6 +296,12 @@ mod tests {
         }
         assert!(message("avif").contains("AVIF"));
         assert!(message("isom").contains("video"));
+    }
+
+    #[test]
+    fn every_picture_of_the_maximum_size_fits_into_the_memory_of_the_checks() {
+        let limits = ImageLimits::default();
+        assert!(limits.max_bytes() >= 3 * limits.max_pixels);
     }
 
     #[test]

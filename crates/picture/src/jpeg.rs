@@ -1,8 +1,9 @@
 //! Finds the end of a JPEG, and adds the Huffman tables that webcams omit.
 
 use std::borrow::Cow;
+use std::io::Cursor;
 
-use image::ImageFormat;
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 
 use crate::error::PictureError;
 
@@ -147,12 +148,12 @@ impl JpegScanner {
 ///
 /// Motion JPEG (AVI1, USB video class) may omit the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2;
 /// they are then inserted before the first scan. Some cameras omit the end marker: it is added if the data before it
-/// are complete.
+/// are complete, which is checked on pictures of up to `max_bytes`.
 ///
 /// # Errors
 /// Truncated or invalid data, data without a picture, or CMYK inks without Adobe's marker, for which it is unknown
 /// whether they are inverted.
-pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
+pub(crate) fn complete_jpeg(bytes: &[u8], max_bytes: u64) -> Result<Cow<'_, [u8]>, PictureError> {
     let damaged = |reason: String| PictureError::DamagedImage { format: "JPEG", reason };
     let mut scanner = JpegScanner::default();
     let (jpeg, lacks_end) = match scanner.advance(bytes) {
@@ -180,7 +181,7 @@ pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError>
     }
     if lacks_end {
         let ended = [without_fill_bytes(&jpeg), &[0xff, END]].concat();
-        if !scanner.is_fully_sent() || !is_complete(&ended) {
+        if !scanner.is_fully_sent() || !is_complete(&ended, max_bytes) {
             return Err(truncated());
         }
         jpeg = Cow::Owned(ended);
@@ -196,13 +197,23 @@ fn without_fill_bytes(jpeg: &[u8]) -> &[u8] {
 
 /// Whether the data before the end marker contain every block. The decoder fills missing blocks depending on the bytes
 /// that follow, so only complete data give the same picture whatever follows them.
-fn is_complete(jpeg: &[u8]) -> bool {
-    let decoded = |filler: &[u8]| {
+fn is_complete(jpeg: &[u8], max_bytes: u64) -> bool {
+    let with = |filler: &[u8]| {
         let (data, end) = jpeg.split_at(jpeg.len() - 2);
-        image::load_from_memory_with_format(&[data, filler, end].concat(), ImageFormat::Jpeg).ok()
+        decoded(&[data, filler, end].concat(), max_bytes)
     };
-    let found = decoded(&[]);
-    found.is_some() && found == decoded(&[0x55; 64]) && found == decoded(&[0xaa; 64])
+    let found = with(&[]);
+    found.is_some() && found == with(&[0x55; 64]) && found == with(&[0xaa; 64])
+}
+
+/// The picture of a complete JPEG; `None` if it cannot be decoded, or only to more than `max_bytes`. The decoder's
+/// default limit is below that of [`ImageLimits`](crate::ImageLimits).
+pub(crate) fn decoded(jpeg: &[u8], max_bytes: u64) -> Option<DynamicImage> {
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(max_bytes);
+    let mut reader = ImageReader::with_format(Cursor::new(jpeg), ImageFormat::Jpeg);
+    reader.limits(limits);
+    reader.decode().ok()
 }
 
 /// A segment with the four tables of annex K: luminance and chrominance DC, luminance and chrominance AC.
@@ -263,10 +274,14 @@ mod tests {
         [&jpeg[..2], &kept, rest].concat()
     }
 
+    fn complete(jpeg: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
+        complete_jpeg(jpeg, u64::MAX)
+    }
+
     #[test]
     fn tables_that_were_left_out_are_put_in() {
         let original = jpeg(40, 30);
-        assert!(matches!(complete_jpeg(&original), Ok(Cow::Borrowed(same)) if same == original));
+        assert!(matches!(complete(&original), Ok(Cow::Borrowed(same)) if same == original));
         let bare = without_tables(&original);
         assert_eq!(
             bare.len(),
@@ -275,40 +290,48 @@ mod tests {
         );
         let decode = |bytes: &[u8]| image::load_from_memory(bytes).map(|picture| picture.to_rgb8());
         assert!(decode(&bare).is_err(), "the decoder needs the tables");
-        assert_eq!(decode(&complete_jpeg(&bare).unwrap()).unwrap(), decode(&original).unwrap());
+        assert_eq!(decode(&complete(&bare).unwrap()).unwrap(), decode(&original).unwrap());
     }
 
     #[test]
     fn what_follows_the_end_is_cut_off_and_what_has_no_end_is_refused() {
         let original = jpeg(40, 30);
         let padded = [original.as_slice(), &[0; 9]].concat();
-        assert_eq!(complete_jpeg(&padded).unwrap(), original);
+        assert_eq!(complete(&padded).unwrap(), original);
         for length in [2, 3, 20, 300, original.len() / 2, original.len() - 60] {
-            let error = complete_jpeg(&original[..length]).unwrap_err().to_string();
+            let error = complete(&original[..length]).unwrap_err().to_string();
             assert!(error.contains(&format!("{length} bytes")), "{error}");
         }
-        assert!(complete_jpeg(&[0xff, START, 0xff, END]).unwrap_err().to_string().contains("without a picture"));
-        assert!(complete_jpeg(b"GIF89a").unwrap_err().to_string().contains("breaks off"));
+        assert!(complete(&[0xff, START, 0xff, END]).unwrap_err().to_string().contains("without a picture"));
+        assert!(complete(b"GIF89a").unwrap_err().to_string().contains("breaks off"));
         // The first half, then the next picture.
         let torn = [&original[..700], &original].concat();
-        assert!(complete_jpeg(&torn).unwrap_err().to_string().contains("breaks off after 700 of"));
+        assert!(complete(&torn).unwrap_err().to_string().contains("breaks off after 700 of"));
     }
 
     #[test]
     fn complete_data_without_an_end_marker_are_read() {
         let original = jpeg(64, 48);
         for cut in [1, 2] {
-            assert_eq!(complete_jpeg(&original[..original.len() - cut]).unwrap(), original, "{cut}");
+            assert_eq!(complete(&original[..original.len() - cut]).unwrap(), original, "{cut}");
         }
         let decode = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().to_rgb8();
         let whole = decode(&original);
         // Missing bytes must be either irrelevant or reported.
         for cut in 3..200 {
-            if let Ok(read) = complete_jpeg(&original[..original.len() - cut]) {
+            if let Ok(read) = complete(&original[..original.len() - cut]) {
                 assert!(decode(&read) == whole, "{cut} bytes");
             }
         }
-        assert!((5..100).all(|cut| complete_jpeg(&original[..original.len() - cut]).is_err()));
+        assert!((5..100).all(|cut| complete(&original[..original.len() - cut]).is_err()));
+    }
+
+    #[test]
+    fn the_check_of_complete_data_has_the_given_limit() {
+        let original = jpeg(64, 48);
+        let cut = &original[..original.len() - 2];
+        assert_eq!(complete_jpeg(cut, 3 * 64 * 48).unwrap(), original);
+        assert!(complete_jpeg(cut, 3 * 64 * 48 - 1).is_err());
     }
 
     #[test]
@@ -316,9 +339,9 @@ mod tests {
         let mut inks = jpeg(16, 16);
         let frame = inks.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
         inks[frame + 9] = 4;
-        assert!(complete_jpeg(&inks).unwrap_err().to_string().contains("CMYK"));
+        assert!(complete(&inks).unwrap_err().to_string().contains("CMYK"));
         inks.splice(2..2, *b"\xff\xee\x00\x0eAdobe\0\x64\0\0\0\0\0");
-        assert!(complete_jpeg(&inks).is_ok());
+        assert!(complete(&inks).is_ok());
     }
 
     #[test]

@@ -3,9 +3,10 @@
 //! Zeros are valid codes, so the decoder continues and gives a wrong picture without an error. They decode to a
 //! different number of blocks than the original data, so at the next marker data are missing or left over.
 
-use image::{DynamicImage, GenericImageView, ImageFormat};
+use image::{DynamicImage, GenericImageView};
 
 use crate::error::PictureError;
+use crate::jpeg::decoded;
 
 /// Minimum number of zeros in a row. Shorter runs occur in many intact pictures. Longer runs occur in intact pictures
 /// with large areas of one colour; the check distinguishes these from gaps.
@@ -30,11 +31,11 @@ struct Stretch {
     restart: Option<u8>,
 }
 
-/// Checks that zeros in the data are codes of the picture.
+/// Checks that zeros in the data are codes of the picture, if it decodes to at most `max_bytes`.
 ///
 /// # Errors
 /// After a run of zeros, the data and the blocks do not end together, or restart markers are out of sequence.
-pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
+pub(crate) fn check_has_no_gap(jpeg: &[u8], max_bytes: u64) -> Result<(), PictureError> {
     let stretches = stretches(jpeg);
     let zeros_in = |stretch: &Stretch| {
         let data = &jpeg[stretch.start..stretch.end];
@@ -49,7 +50,7 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
             (None, Some(after)) => after == 0,
             (_, None) => true,
         };
-        if !is_in_order || !ends.get_or_insert_with(|| Ends::of(jpeg)).ends_with_its_blocks(stretch) {
+        if !is_in_order || !ends.get_or_insert_with(|| Ends::of(jpeg, max_bytes)).ends_with_its_blocks(stretch) {
             let count = jpeg[at..].iter().take_while(|byte| **byte == 0).count();
             let reason = format!(
                 "{count} zeros in a row from byte {at} in place of picture data: copy the file again from its source"
@@ -60,13 +61,10 @@ pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
     Ok(())
 }
 
-fn decoded(jpeg: &[u8]) -> Option<DynamicImage> {
-    image::load_from_memory_with_format(jpeg, ImageFormat::Jpeg).ok()
-}
-
 /// Tests the ends of stretches.
 struct Ends<'a> {
     jpeg: &'a [u8],
+    max_bytes: u64,
     /// `None` if the picture cannot be decoded, or has one colour. A picture of one colour may consist only of zero
     /// codes, and the decoder fills missing blocks with the same colour.
     whole: Option<DynamicImage>,
@@ -75,13 +73,13 @@ struct Ends<'a> {
 }
 
 impl<'a> Ends<'a> {
-    fn of(jpeg: &'a [u8]) -> Self {
-        let whole = decoded(jpeg).filter(|whole| {
+    fn of(jpeg: &'a [u8], max_bytes: u64) -> Self {
+        let whole = decoded(jpeg, max_bytes).filter(|whole| {
             let first = whole.get_pixel(0, 0);
             whole.pixels().any(|(.., pixel)| pixel != first)
         });
         let pixels = whole.as_ref().map_or(1, |whole| u64::from(whole.width()) * u64::from(whole.height()));
-        Self { jpeg, whole, left: (MAX_TESTED_PIXELS / (4 * pixels)).clamp(1, MAX_TESTED) }
+        Self { jpeg, max_bytes, whole, left: (MAX_TESTED_PIXELS / (4 * pixels)).clamp(1, MAX_TESTED) }
     }
 
     /// Whether the decoder reads the data of a stretch to their end, and needs no data beyond.
@@ -90,7 +88,7 @@ impl<'a> Ends<'a> {
         self.left -= 1;
         let is_same = |kept_to: usize, filler: &[u8]| {
             let changed = [&self.jpeg[..kept_to], filler, &self.jpeg[stretch.end..]].concat();
-            decoded(&changed).is_some_and(|other| other == *whole)
+            decoded(&changed, self.max_bytes).is_some_and(|other| other == *whole)
         };
         let runs_out = PROBES.into_iter().any(|probe| !is_same(stretch.end, &[probe; ADDED_BYTES]));
         let last = stretch.end.saturating_sub(EXCHANGED_BYTES).max(stretch.start);
@@ -144,14 +142,16 @@ mod tests {
     #[test]
     fn zeros_instead_of_a_part_are_told() {
         let original = jpeg(&RgbImage::from_fn(160, 120, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8])));
-        check_has_no_gap(&original).unwrap();
+        let size = 3 * 160 * 120;
+        check_has_no_gap(&original, size).unwrap();
         let [data] = &stretches(&original)[..] else { panic!("one scan") };
         for part in [8, 20, 40] {
             let (start, length) = ((data.start + data.end) / 2, (data.end - data.start) / part);
             let mut damaged = original.clone();
             damaged[start..start + length].fill(0);
             assert!(image::load_from_memory(&damaged).is_ok(), "expected the decoder to accept it");
-            let told = check_has_no_gap(&damaged).unwrap_err().to_string();
+            assert!(check_has_no_gap(&damaged, size - 1).is_ok(), "expected no check without memory for it");
+            let told = check_has_no_gap(&damaged, size).unwrap_err().to_string();
             assert!(told.contains("zeros in a row from byte"), "{told}");
         }
     }
@@ -169,10 +169,11 @@ mod tests {
             [&parts.concat(), data, &[0xff, 0xd9]].concat()
         };
         let with_zeros = |count: usize| of_data(&[&[0b0010_1000][..], &vec![0; count], &[0b1010_0000]].concat());
-        check_has_no_gap(&with_zeros(79)).unwrap();
-        assert!(check_has_no_gap(&with_zeros(99)).is_err(), "20 bytes are left over");
-        assert!(check_has_no_gap(&with_zeros(59)).is_err(), "20 bytes are missing");
+        let check = |jpeg: &[u8]| check_has_no_gap(jpeg, u64::MAX);
+        check(&with_zeros(79)).unwrap();
+        assert!(check(&with_zeros(99)).is_err(), "20 bytes are left over");
+        assert!(check(&with_zeros(59)).is_err(), "20 bytes are missing");
         // Only zero codes: a picture of one colour.
-        check_has_no_gap(&of_data(&[0; 80])).unwrap();
+        check(&of_data(&[0; 80])).unwrap();
     }
 }

@@ -49,7 +49,7 @@ pub(super) const COCO: Target = Target {
             let picture = ImageFacts { file_name: Some(name), ..PICTURE };
             let _ = labels.as_ref().map(|labels| labels.instances(&picture));
         }
-        let _ = Annotation::passed_over(bytes);
+        let _ = Annotation::passed_over(bytes, &PICTURE);
         read(bytes, None, &PICTURE)
     },
 };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
-use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile};
+use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile, Sample};
 use sdg_evaluation::held_back::{HeldBackSamples, labels_of};
 use sdg_grasp::CheckConfig;
 use serde_json::json;
@@ -56,11 +56,13 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     let label = demonstrations[0].annotation.label.clone();
-    let held_back = args
-        .held_back
-        .then(|| HeldBackSamples::new(&demonstrations, &CheckConfig::DEFAULT_SIZE_TOLERANCE, args.seed))
-        .transpose()?;
-    let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
+    let sample: Box<dyn Fn(u64) -> Sample> = if args.held_back {
+        let held_back = HeldBackSamples::new(&demonstrations, &CheckConfig::DEFAULT_SIZE_TOLERANCE, args.seed)?;
+        Box::new(move |i| held_back.sample(i))
+    } else {
+        let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
+        Box::new(move |i| augmenter.sample(i))
+    };
     sdg_files::prepare_folder(&args.out)?;
     let picture_name = |i: u64| format!("{i:06}.png");
     let pictures = (0..u64::from(args.count)).map(picture_name);
@@ -69,7 +71,7 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     let mut coco = CocoFile::new();
     let mut with_part = 0;
     for i in 0..u64::from(args.count) {
-        let sample = held_back.as_ref().map_or_else(|| augmenter.sample(i), |held_back| held_back.sample(i));
+        let sample = sample(i);
         let name = picture_name(i);
         sdg_files::write_png(&args.out.join(&name), &sample.image)?;
 

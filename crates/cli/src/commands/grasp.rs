@@ -126,7 +126,7 @@ fn prepare(args: &GraspArgs) -> Result<GraspTask> {
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
-    sdg_files::check_writable(&args.states)?;
+    sdg_files::check_replaceable(&args.states, None, b"time_secs")?;
     let settings = GraspSettings {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,

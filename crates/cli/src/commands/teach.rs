@@ -192,21 +192,24 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         None => error,
     })?;
     let TaughtFile { taught, bytes, .. } = file;
-    let page = match &args.report {
-        Some(folder) => {
-            let command = command(args);
-            let page = TeachingPage {
-                taught: &taught,
-                figures: &figures,
-                demonstrations: &demonstrations,
-                seed: args.seed,
-                seconds: clock::elapsed_secs(),
-                command: &command,
-            };
-            Some(page.report()?.write(folder)?)
-        }
-        None => None,
+    let write_page = |folder: &Path| -> Result<PathBuf> {
+        let page = TeachingPage {
+            taught: &taught,
+            figures: &figures,
+            demonstrations: &demonstrations,
+            seed: args.seed,
+            seconds: clock::elapsed_secs(),
+            command: &command(args),
+        };
+        Ok(page.report()?.write(folder)?)
     };
+    let page = args.report.as_deref().and_then(|folder| {
+        // The model is written and tested: without the page, its results are still printed.
+        let told = |error: &anyhow::Error| {
+            eprintln!("{} --report: no page was written: {error:#}", Paint::stderr().text(Tone::Doubtful, "warning:"));
+        };
+        write_page(folder).inspect_err(told).ok()
+    });
 
     let facts = taught.model.facts();
     let failure = figures.failure();

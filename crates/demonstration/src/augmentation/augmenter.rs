@@ -3,7 +3,7 @@
 use sdg_geometry::BoundingBox;
 
 use super::background::NoiseBank;
-use super::config::{AugmentationConfig, AugmentationStyle, check_output_size};
+use super::config::{AugmentationConfig, AugmentationStyle, check_output_size, output_size_of};
 use super::homography::Homography;
 use super::noise::NormalTable;
 use super::paper::PaperDraw;
@@ -47,7 +47,7 @@ impl Augmenter {
             });
         };
         demonstrations.iter().try_for_each(Demonstration::check)?;
-        let frame = config.output_size.unwrap_or([first.image.width(), first.image.height()]);
+        let frame = config.output_size.unwrap_or_else(|| output_size_of(first.image.dimensions().into()));
         check_output_size(frame)?;
         let mut rng = sample_rng(seed, Stream::Preparation, 0);
         let parts = demonstrations.iter().map(|one| Prepared::new(one, frame, &mut rng)).collect();

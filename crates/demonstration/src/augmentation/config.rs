@@ -1,12 +1,23 @@
 //! The configuration of the augmentation.
 
+use std::ops::RangeInclusive;
+
 use crate::{Error, Result};
+
+/// Width and height that a sample may have, in pixels.
+const SIDES: RangeInclusive<u32> = 16..=8192;
+/// Photos of up to this many pixels give samples of their own size: phones usually take photos of 4032 × 3024 pixels.
+const MAX_OWN_PIXELS: f64 = 4096.0 * 3072.0;
+/// Maximum number of pixels of a sample of a larger photo. Derived from a limit of 2 GB: the 48 samples on which a
+/// network is validated take 0.9 GB, a prepared photo takes 0.4 GB (40 bytes for each of 1.56 times as many pixels), and
+/// a sample in the making 0.1 GB. With [`MAX_OWN_PIXELS`] it would be 3 GB.
+const MAX_REDUCED_PIXELS: f64 = 0.5 * MAX_OWN_PIXELS;
 
 /// Settings of an [`Augmenter`](crate::Augmenter).
 #[derive(Debug, Clone, PartialEq)]
 pub struct AugmentationConfig {
-    /// Width and height of the samples in pixels; `None` for the first demonstration's own size. Demonstrations of
-    /// other sizes are scaled to fit.
+    /// Width and height of the samples in pixels; `None` for the first demonstration's own size, reduced if its photo
+    /// has more than 12.6 megapixels or a side above 8192 pixels. Demonstrations of other sizes are scaled to fit.
     pub output_size: Option<[u32; 2]>,
     /// The kind of scenes.
     pub style: AugmentationStyle,
@@ -159,10 +170,30 @@ impl AugmentationConfig {
     }
 }
 
+/// Width and height of the samples of a photo if the settings give none: those of the photo, reduced if it is large.
+pub(crate) fn output_size_of(photo: [u32; 2]) -> [u32; 2] {
+    let is_large = pixels(photo) > MAX_OWN_PIXELS;
+    sample_size(photo, if is_large { MAX_REDUCED_PIXELS } else { MAX_OWN_PIXELS })
+}
+
+/// Width and height of samples of the photo's shape, with at most `max_pixels` and with sides that a sample may have:
+/// those of the photo if possible.
+pub fn sample_size(photo: [u32; 2], max_pixels: f64) -> [u32; 2] {
+    let by_side = f64::from(*SIDES.end()) / f64::from(photo[0].max(photo[1]));
+    let shrink = (max_pixels / pixels(photo)).sqrt().min(by_side);
+    if shrink >= 1.0 {
+        return photo;
+    }
+    photo.map(|side| ((f64::from(side) * shrink).round() as u32).max(*SIDES.start()))
+}
+
+fn pixels([width, height]: [u32; 2]) -> f64 {
+    f64::from(width) * f64::from(height)
+}
+
 /// Refuses impossible sizes of samples, from the settings or from the photo.
 pub(crate) fn check_output_size([width, height]: [u32; 2]) -> Result<()> {
-    let side = 16..=8192;
-    if side.contains(&width) && side.contains(&height) {
+    if SIDES.contains(&width) && SIDES.contains(&height) {
         Ok(())
     } else {
         refuse(
@@ -207,5 +238,24 @@ mod tests {
         assert!(bad.check().unwrap_err().to_string().contains("positive_share: expected 0 to 1, found NaN"));
         assert!(check_output_size([0, 240]).is_err() && check_output_size([320, 240]).is_ok());
         assert!(check_output_size([30_000, 100]).unwrap_err().to_string().contains("30000×100"));
+    }
+
+    #[test]
+    fn samples_of_a_large_photo_are_smaller() {
+        for own in [[640, 480], [10, 10], [4032, 3024], [3072, 4096], [8192, 64]] {
+            assert_eq!(output_size_of(own), own);
+        }
+        // √(6,291,456 / 63,000,000) = 0.316.
+        assert_eq!(output_size_of([9000, 7000]), [2844, 2212]);
+        // 8192 / 9000 = 0.910.
+        assert_eq!(output_size_of([9000, 64]), [8192, 58]);
+        assert_eq!(output_size_of([64, 9000]), [58, 8192]);
+        assert_eq!(sample_size([1280, 960], 640.0 * 480.0), [640, 480]);
+        // 13 to 200 megapixels: all samples can be made, and none has more pixels than that.
+        for large in [[4160, 3120], [16_384, 12_288], [200_000, 1000], [1_000_000, 20]] {
+            let size = output_size_of(large);
+            assert!(check_output_size(size).is_ok(), "{large:?}: {size:?}");
+            assert!(pixels(size) < 1.01 * MAX_REDUCED_PIXELS, "{large:?}: {size:?}");
+        }
     }
 }

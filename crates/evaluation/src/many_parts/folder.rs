@@ -39,8 +39,8 @@ impl DemonstrationFolder {
     /// Reads a folder. Each photo with marks beside it is a part; each subfolder with such photos is a part as well.
     ///
     /// # Errors
-    /// The folder cannot be read or has no photo with marks; two parts have the same name; a symmetry is invalid or
-    /// given for an unknown part.
+    /// The folder cannot be read or has no photo with marks; two parts have the same name, or two photos the same
+    /// marks; a symmetry is invalid or given for an unknown part.
     pub fn read(folder: &Path, symmetry: impl Fn(&str) -> Result<RotationalSymmetry, String>) -> Result<Self> {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
         let mut left_out = Vec::new();
@@ -63,7 +63,18 @@ impl DemonstrationFolder {
                     photo.display(),
                     known.files[0].0.display()
                 ),
-                Some(known) => known.files.push((photo, marks)),
+                Some(known) => {
+                    if let Some((other, _)) = known.files.iter().find(|(_, of_other)| *of_other == marks) {
+                        bail!(
+                            "{}: expected marks of its own, found {}, also the marks of {}; rename or remove one of the \
+                             photos",
+                            photo.display(),
+                            marks.display(),
+                            other.display()
+                        );
+                    }
+                    known.files.push((photo, marks));
+                }
                 None => {
                     let part = PartDemonstrations { name: name.clone(), files: vec![(photo, marks)], symmetry: None };
                     found.insert(name, part);
@@ -169,6 +180,20 @@ mod tests {
         let found: Vec<_> = read.parts.iter().map(|part| (part.name.as_str(), part.symmetry)).collect();
         let [two, four] = [2, 4].map(|times| Some(RotationalSymmetry::Fold(times)));
         assert_eq!(found, [("key", four), ("rod end", two)]);
+    }
+
+    #[test]
+    fn photos_that_differ_only_in_their_format_do_not_share_marks() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("key")).unwrap();
+        for name in ["a.jpg", "a.png", "a.json"] {
+            fs::write(folder.path().join("key").join(name), "").unwrap();
+        }
+        let read = || DemonstrationFolder::read(folder.path(), |text| Err(text.to_owned()));
+        let error = read().unwrap_err().to_string();
+        assert!(["a.jpg", "a.png", "a.json"].iter().all(|name| error.contains(name)), "{error}");
+        fs::remove_file(folder.path().join("key/a.jpg")).unwrap();
+        assert_eq!(read().unwrap().parts[0].files.len(), 1);
     }
 
     #[test]

@@ -69,7 +69,8 @@ impl NetworkTeaching {
             distinct_samples: (preset == Preset::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match preset {
                 Preset::Paper => AugmentationConfig::paper(),
-                // Samples of the photo's size, so that verification is calibrated at the same resolution.
+                // Samples of the photo's size, so that verification is calibrated at the same resolution. Those of a
+                // large photo are smaller, as is the resolution at which a long part is compared.
                 _ => AugmentationConfig::default(),
             },
             min_hit_rate: MIN_HIT_RATE,

@@ -282,6 +282,24 @@ fn a_photo_with_another_number_of_pixels_teaches_as_well() {
 }
 
 #[test]
+fn a_photo_longer_than_the_largest_sample_teaches_with_and_without_a_network() {
+    let mut wide = demonstration();
+    wide.image = RgbImage::from_pixel(9000, 112, Rgb([60, 60, 70]));
+    image::imageops::replace(&mut wide.image, &demonstration().image, 0, 0);
+    let wide = [wide];
+    without_network(&wide).unwrap();
+    let options = TeachOptions { kind: ModelKind::C, ..TeachOptions::new(1) };
+    let mut teaching = small_teaching(&options);
+    // The part is 16 pixels long in the training samples and at the network's input.
+    let [width_px, height_px] = [2304, 32];
+    teaching.samples = teaching.samples.with_output_size(width_px, height_px);
+    teaching.detector.network.input.resize = ResizeRule::FitWithin { width_px, height_px };
+    let proceed = &mut |_: &TeachingEvent| ControlFlow::Continue(());
+    let taught = teach_network(&wide, &wide, &teaching, &options, proceed, Instant::now()).unwrap();
+    assert_eq!(taught.model.facts().steps, STEPS);
+}
+
+#[test]
 fn a_narrower_size_tolerance_refuses_other_sizes_and_is_kept_in_the_file() {
     let options = TeachOptions { kind: ModelKind::S, size_tolerance: 0.95..=1.05, ..TeachOptions::new(1) };
     let taught = teach(&[demonstration()], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;

@@ -64,7 +64,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let (camera, existing) = camera_files::read(&args.camera)?;
     let poses = robot_poses::read(&args.poses)?;
     if let Some(out) = &args.out {
-        sdg_files::check_extendable(out, Some(&args.camera))?;
+        sdg_files::check_replaceable(out, Some(&args.camera), existing.as_bytes())?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
     robot_poses::check_pictures_exist(&poses, folder)?;

@@ -1,6 +1,6 @@
 //! `sdg evaluate --split`: sets that may be used for tuning and sets that are only reported.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use sdg_evaluation::split::{
@@ -31,7 +31,7 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
         bail!("{}: expected sets to measure, found none", file.display());
     }
     for path in [&args.split.results, &args.split.records].into_iter().flatten() {
-        sdg_files::check_writable(path)?;
+        sdg_files::check_replaceable(path, None, b"{")?;
     }
 
     let progress = EvaluationProgress::new();
@@ -39,18 +39,19 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     progress.finish();
 
     let results = results_json(file, &sides, &measured);
-    if let Some(path) = &args.split.results {
-        sdg_files::write(path, results.to_string().as_bytes())?;
-    }
-    if let Some(path) = &args.split.records {
+    let write_results = |path: &PathBuf| -> Result<()> { Ok(sdg_files::write(path, results.to_string().as_bytes())?) };
+    let write_records = |path: &PathBuf| -> Result<()> {
         let lines = measured.iter().map(candidates).collect::<Result<String>>()?;
-        sdg_files::write(path, lines.as_bytes())?;
-    }
+        Ok(sdg_files::write(path, lines.as_bytes())?)
+    };
+    // The measurement took long: if one file cannot be written, the other one and the tables still are.
+    let written = [args.split.results.as_ref().map(write_results), args.split.records.as_ref().map(write_records)];
     if args.json {
         println!("{results}");
     } else {
         let tables: Vec<String> = measured.iter().map(|of_model| tables(of_model, &sides)).collect();
         print!("{}", tables.join("\n"));
     }
+    written.into_iter().flatten().collect::<Result<()>>()?;
     Ok(Outcome::Done)
 }
