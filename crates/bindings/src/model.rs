@@ -147,7 +147,11 @@ impl Model {
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {
             return Ok(Arc::clone(&last.perception));
         }
-        let model = GraspModel::clone(&self.model);
+        let mut model = GraspModel::clone(&self.model);
+        if region != RegionChoice::OfModel {
+            // The model's region, which is replaced, may not fit this camera's pictures.
+            model = model.with_region(None)?;
+        }
         let mut perception = match camera {
             Some(camera) => Perception::calibrated(model, camera.calibrated())?,
             None => Perception::of_any_camera(model),
