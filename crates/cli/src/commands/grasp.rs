@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
-use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, Pictures, SeenOutline};
+use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, ModelFinder, Pictures};
 use sdg_grasp::GraspError;
 use sdg_inputs::camera_files;
-use sdg_robot::{Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspTarget, Robot, SafetyLimits};
+use sdg_robot::{Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspTarget, PartFinder, Robot, SafetyLimits};
 
 use crate::clock;
 use crate::commands::devices;
@@ -194,7 +194,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     let mut finder = task.finder(pictures);
     if args.dry_run {
         let target = finder.find_for_plan(arm, task.told())?;
-        dry_run(args, task, arm, limits.clone(), target, finder.seen())?;
+        dry_run(args, task, arm, limits.clone(), target, &finder)?;
     }
     if args.dry_run || address.is_some() {
         let question = match address {
@@ -225,15 +225,15 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
 }
 
 /// Plans from the arm's current posture; draws and prints the plan.
-fn dry_run<A: Arm>(
+fn dry_run<A: Arm, P: Pictures<A>>(
     args: &GraspArgs,
     task: &GraspTask,
     arm: &mut A,
     limits: SafetyLimits,
     target: Option<GraspTarget>,
-    seen: Option<&SeenOutline>,
+    finder: &ModelFinder<P>,
 ) -> Result<()> {
-    let plan = task.plan(arm, limits, target)?;
+    let plan = task.plan(arm, limits, target, PartFinder::<A>::others(finder))?;
     eprintln!("planned, not executed:");
     print_plan(&plan)?;
     #[cfg(feature = "simulation")]
@@ -241,7 +241,7 @@ fn dry_run<A: Arm>(
         eprintln!("no motion is drawn: {missing}");
         return Ok(());
     }
-    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell)? {
+    for file in draw_dry_run(&plan, &args.out, finder.seen().filter(|_| target.is_some()), &task.workcell)? {
         eprintln!("  {}", file.display());
     }
     Ok(())
