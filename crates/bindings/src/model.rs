@@ -127,7 +127,7 @@ impl Model {
             let found = perception.detect(picture, Verification::ByShape)?;
             let size = picture.dimensions().into();
             let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
-            let touched = perception.touched_among_accepted(&detections, min_score);
+            let touched = perception.touched_among_accepted(&detections, |idx| detections[idx].score >= min_score);
             let record = |(found, jaws_touch): (&Found, Vec<usize>)| Record {
                 found: FoundRecord::new(found, &perception),
                 size: perception.size_of(&found.detection, size),
