@@ -425,6 +425,11 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
         &["known.yaml: expected --camera ", "known.yaml, which keeps its lens, or another"],
     );
     assert_eq!(fs::read(&known).unwrap(), before);
+    // Another program's calibration, whose lens model is not ours, is not replaced either.
+    let eight = String::from_utf8(before).unwrap().replace("data: [-0.31", "data: [0.0, 0.0, 0.0, -0.31");
+    let rational = files.text("rational.yaml", &eight);
+    table(&[a, "--out", &rational], 2, &["--out: expected a new file or that of an estimated camera", "with 8"]);
+    assert_eq!(fs::read_to_string(&rational).unwrap(), eight);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400"], 2, &["X,Y"]);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400000,0"], 2, &["5000 mm"]);
     let nonsense = files.text("nonsense.yaml", &fs::read_to_string(&known).unwrap().replace("450.0", "-450.0"));
