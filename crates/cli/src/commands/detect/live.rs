@@ -221,7 +221,7 @@ mod tests {
         };
         let touched = |state: TrackState| {
             let line: Value = serde_json::from_str(&printed(state, "--json")).unwrap();
-            [0, 1].map(|idx| line["detections"][idx]["jaws_touch"].clone())
+            [0_usize, 1].map(|idx| line["detections"][idx]["jaws_touch"].clone())
         };
         assert_eq!(touched(TrackState::Followed)[0], serde_json::json!([1]));
         assert_eq!(touched(TrackState::Lost), [Value::Null, Value::Null]);
