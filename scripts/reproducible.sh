@@ -15,8 +15,14 @@ for folder in first a/second/longer/folder; do
     # The folder's name must not become part of the program.
     (cd "$work/$folder" && RUSTFLAGS="--remap-path-prefix=$work/$folder=." CARGO_TARGET_DIR="$work/$folder/target" \
         cargo build --quiet --release --locked "${arguments[@]}")
-    (cd "$work/$folder/target/release" && find . -maxdepth 2 -type f -executable -not -path './build/*' -not -path './deps/*' \
-        -not -name '*-*' -print0 | sort -z | xargs -0 sha256sum) | tee "$work/sums-${folder%%/*}"
+    # Cargo's own copies of a program have a hash in their names.
+    (cd "$work/$folder/target/release" && find . -maxdepth 2 -regextype posix-extended -type f -executable \
+        -not -path './build/*' -not -path './deps/*' -not -regex '.*-[0-9a-f]{16}(\.so)?' -print0 |
+        sort -z | xargs -0 -r sha256sum) | tee "$work/sums-${folder%%/*}"
+    [ -s "$work/sums-${folder%%/*}" ] || {
+        echo "reproducible: expected programs of cargo build ${arguments[*]}, found none" >&2
+        exit 1
+    }
 done
 if cmp "$work/sums-first" "$work/sums-a"; then
     echo "reproducible: equal, of commit $commit"

@@ -25,7 +25,7 @@ fail() {
 }
 
 python=$peers/venv/bin/python
-tests=${TESTS:-bytes arm pictures services faults latency memory fast}
+tests=${TESTS:-bytes arm pictures services faults latency memory fast attack}
 for name in $tests; do
     case $name in
     bytes)
@@ -35,6 +35,10 @@ for name in $tests; do
     arm)
         echo "== an arm behind actions, over Cyclone DDS"
         "$python" $source/arm_peer.py "$examples/arm_against_peer" || fail arm
+        ;;
+    attack)
+        echo "== mutated packets"
+        "$python" $source/rtps_attack.py "$target/release/sdg" "$peers/models" "${PACKETS:-100000}" || fail attack
         ;;
     fast)
         echo "== Fast DDS"

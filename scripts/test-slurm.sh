@@ -26,12 +26,17 @@ chmod 700 "$work/munge"
 say() { printf '%s %s\n' "$(date +%T)" "$*"; }
 die() { echo "test-slurm: $*" >&2; tail -n 20 "$work"/log/*.log >&2 || true; exit 1; }
 
+# Without it, Slurm's programs would ask another cluster's controller.
+export SLURM_CONF=$work/slurm.conf
+
 # Ends the processes of this script: first the tasks, then the daemons by the process ids in their files.
 stop() {
-    jobs=$(squeue --noheader --format %A 2>/dev/null | sort -u) || jobs=
-    if [ -n "$jobs" ]; then
-        scancel $jobs 2>/dev/null || true
-        sleep 3
+    if [ -e "$SLURM_CONF" ]; then
+        jobs=$(squeue --noheader --format %A 2>/dev/null | sort -u) || jobs=
+        if [ -n "$jobs" ]; then
+            scancel $jobs 2>/dev/null || true
+            sleep 3
+        fi
     fi
     for pid_file in "$work"/run/*.pid; do
         [ -e "$pid_file" ] && kill "$(cat "$pid_file")" 2>/dev/null || true
@@ -46,7 +51,7 @@ munged --force --key-file="$work/munge/key" --socket="$work/munge/socket" --pid-
 
 host=$(uname -n)
 port=${SLURM_TEST_PORT:-17002}
-cat >"$work/slurm.conf" <<CONF
+cat >"$SLURM_CONF" <<CONF
 ClusterName=test
 SlurmctldHost=$host(127.0.0.1)
 SlurmUser=root
@@ -79,7 +84,6 @@ NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 1)) CPUs=1 Real
 NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 2)) CPUs=1 RealMemory=8000
 PartitionName=p Nodes=n1,n2 Default=YES State=UP MaxTime=600
 CONF
-export SLURM_CONF=$work/slurm.conf
 slurmctld -i || die "the controller does not start"
 for node in n1 n2; do slurmd -N $node || die "the daemon of $node does not start"; done
 for _ in $(seq 30); do

@@ -111,22 +111,50 @@ fn an_old_compiler_is_told() {
     assert!(found.contains(concat!("expected Rust ", env!("CARGO_PKG_RUST_VERSION"))), "{found}");
 }
 
+/// A Python of version `$version` for [`bash`] that makes environments of programs without effect.
+const PYTHON: &str = "python3() {
+        case $1 in
+        -V) echo Python $version ;;
+        -m)
+            mkdir -p $3/bin
+            for program in python pip cargo-zigbuild; do ln -sf /bin/true $3/bin/$program; done
+            echo $3 made for $version
+            ;;
+        esac
+    }
+    export -f python3
+    export version\n";
+
+/// The last components of the environments in an output, with their versions.
+fn made(found: &str) -> Vec<&str> {
+    found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect()
+}
+
 #[test]
 fn an_environment_is_made_again_for_another_python_or_folder() {
-    let found = bash(
-        "python3() {
-            case $1 in
-            -V) echo Python $version ;;
-            -m) mkdir -p $3/bin; ln -s /bin/true $3/bin/python; ln -s /bin/true $3/bin/pip; echo $3 made for $version ;;
-            esac
-        }
-        export -f python3
-        for version in 3.11 3.11 3.12; do version=$version scripts/python/venv.sh $1/first a==1; done
+    let found = bash(&format!(
+        "{PYTHON}for version in 3.11 3.11 3.12; do scripts/python/venv.sh $1/first a==1; done
         mv $1/first $1/second
-        version=3.12 scripts/python/venv.sh $1/second a==1",
-    );
-    let made: Vec<&str> = found.lines().map(|line| line.rsplit_once('/').unwrap().1).collect();
-    assert_eq!(made, ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
+        scripts/python/venv.sh $1/second a==1"
+    ));
+    assert_eq!(made(&found), ["first made for 3.11", "first made for 3.12", "second made for 3.12"]);
+}
+
+#[test]
+fn the_environment_of_zig_is_made_again_and_leaves_the_compiled_tools() {
+    // The compiler has every target.
+    let found = bash(&format!(
+        "{PYTHON}cp -r scripts $1
+        cd $1
+        export CARGO=true
+        rustc() {{ echo .; }}
+        triple=machine
+        mkdir -p lib/rustlib/$triple target/packages/tools/bin
+        ln -s /bin/true target/packages/tools/bin/cargo-auditable
+        for version in 3.11 3.11 3.12; do (source scripts/packages/zig.sh); done
+        [ -x target/packages/tools/bin/cargo-auditable ]"
+    ));
+    assert_eq!(made(&found), ["zig made for 3.11", "zig made for 3.12"]);
 }
 
 #[test]
@@ -138,4 +166,47 @@ fn packages_are_not_built_without_git() {
         for package in deb tarball image windows lay_out; do ! scripts/packages/$package.sh usr 2>&1; done",
     );
     assert_eq!(found.matches("packages: expected a git clone").count(), 5, "{found}");
+}
+
+#[test]
+fn jobs_of_another_cluster_are_not_cancelled() {
+    // Everything after the daemon of munge fails.
+    let found = bash(
+        "id() { echo 0; }
+        dpkg() { echo amd64; }
+        dpkg-query() { echo installed amd64; }
+        munged() { echo munged; return 1; }
+        squeue() { echo 7; }
+        scancel() { echo cancelled $*; }
+        sleep() { :; }
+        export -f id dpkg dpkg-query munged squeue scancel sleep
+        export CARGO_TARGET_DIR=$1 SDG=/bin/true
+        ! scripts/test-slurm.sh 2>&1",
+    );
+    assert_eq!(found, "munged\n");
+}
+
+#[test]
+fn no_programs_are_not_equal_programs() {
+    // Each program contains the name of its folder, unless `same` is given.
+    let found = bash(
+        "git() { :; }
+        tar() { :; }
+        cargo() {
+            mkdir -p $CARGO_TARGET_DIR/release
+            cd $CARGO_TARGET_DIR/release
+            for name in $programs; do pwd >$name; chmod +x $name; done
+            [ -z \"$same\" ] || echo $same >sdg-bench
+        }
+        export -f git tar cargo
+        export TMPDIR=$1 programs same
+        ! programs= same= scripts/reproducible.sh 2>&1
+        ! programs=sdg-bench same= scripts/reproducible.sh 2>&1 | tail -n 1
+        programs='sdg-bench sdg-0123456789abcdef' same=bytes scripts/reproducible.sh 2>&1 | tail -n 1",
+    );
+    let lines: Vec<&str> = found.lines().collect();
+    let [none, differing, equal] = lines[..] else { panic!("{found}") };
+    assert!(none.ends_with("expected programs of cargo build --package sdg-fci --example hand_checks, found none"));
+    assert!(differing.contains("expected equal files"), "{found}");
+    assert!(equal.contains("reproducible: equal"), "{found}");
 }

@@ -260,11 +260,11 @@ def teach(
     as a dictionary. model: S, which takes seconds, or A, B, C or D, which have a network and take half a minute or
     more. steps, time_budget_s: maximum steps and seconds of the network's training. symmetry: number of angles at which
     the part looks the same, or "full". size_tolerance: minimum and maximum size of the part in a picture, relative to
-    its size in the photo. region: (left, upper, width, height) in pixels of the photo. camera: the file of the
-    calibrated camera that took the photo, for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks
-    and of the grasp above the table, with a camera; grasp_height_mm defaults to half of mark_height_mm. negatives:
-    files of pictures without the part. more_demos: further photos of the part, each with its marks, like photo and
-    marks.
+    its size in the photo; with a calibrated camera, 0.9 to 1.11 times the part's size is searched instead. region:
+    (left, upper, width, height) in pixels of the photo. camera: the file of the calibrated camera that took the photo,
+    for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a
+    camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part.
+    more_demos: further photos of the part, each with its marks, like photo and marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """

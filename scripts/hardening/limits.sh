@@ -9,7 +9,8 @@ cd "$(dirname "$0")/../.."
 work=$PWD/target/limits
 rm -rf "$work/source"
 mkdir -p "$work/source"
-git archive HEAD | tar -x -C "$work/source"
+# -m: files with the times of a commit can be older than programs that cargo built of another commit, and would be kept.
+git archive HEAD | tar -x -m -C "$work/source"
 cd "$work/source"
 export CARGO_TARGET_DIR=$work/build
 

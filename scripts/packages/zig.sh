@@ -10,11 +10,10 @@ source scripts/other_target.sh
 GLIBC=2.31
 profile=${PROFILE:-ship}
 tools=target/packages/tools
-scripts/install.sh python3-venv
-if [ ! -x "$tools/bin/cargo-zigbuild" ]; then
-    python3 -m venv "$tools"
-    "$tools/bin/pip" --quiet --disable-pip-version-check install 'cargo-zigbuild==0.24.1' 'ziglang==0.17.1'
-fi
+mkdir -p "$tools"
+# Not in the folder of the tools, which are compiled and would be deleted with the environment.
+zig=target/packages/zig
+scripts/python/venv.sh "$zig" cargo-zigbuild==0.24.1 ziglang==0.17.1
 choose_compiler "$triple"
 # A separate target folder, because linker and profile are different.
 zig_target=target/packages/target
@@ -33,6 +32,6 @@ zig_cargo() {
     local command=$1 runner=()
     shift
     [ ${#emulated[@]} = 0 ] || runner=("CARGO_TARGET_$(tr a-z- A-Z_ <<<"$triple")_RUNNER=${emulated[*]}")
-    env PATH="$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" "${runner[@]}" \
+    env PATH="$PWD/$zig/bin:$PWD/$tools/bin:$PATH" CARGO="$cargo_for_target" CARGO_TARGET_DIR="$zig_target" "${runner[@]}" \
         cargo-zigbuild "$command" --locked --profile "$profile" --target "$triple.$GLIBC" "${standard_library[@]}" "$@"
 }

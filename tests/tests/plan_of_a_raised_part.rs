@@ -87,4 +87,5 @@ fn a_part_that_was_put_down_is_searched_at_the_height_of_its_place() {
     let found = finder.find_nearest(&mut cell, &expected).unwrap().unwrap();
     let apart = found.base_from_tcp.translation.vector - expected.translation.vector;
     assert!(apart.xy().norm() < 0.005 && apart.z.abs() < 1e-6, "{apart}");
+    assert!(finder.last().is_none(), "no picture for a grasp was taken");
 }

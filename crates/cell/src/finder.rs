@@ -91,7 +91,7 @@ pub struct ModelFinder<P> {
     taken: Option<Instant>,
     /// Whether detections are checked against the demonstration.
     verification: Verification,
-    /// The last picture and its detections, best first.
+    /// The last picture for a grasp and its detections, best first.
     last: Option<(RgbImage, Vec<Found>)>,
     /// The part that the last search chose.
     seen: Option<SeenOutline>,
@@ -165,7 +165,8 @@ impl<P> ModelFinder<P> {
         Self { heights_m: Some(heights_m), ..self }
     }
 
-    /// The last picture and its detections, best first.
+    /// The last picture for a grasp and its detections, best first; not one of [`PartFinder::find_nearest`], which
+    /// shows a part that was put down.
     pub fn last(&self) -> Option<(&RgbImage, &[Found])> {
         self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
@@ -419,7 +420,10 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         };
         let higher_m = self.higher_m(base_from_tcp);
         let heights_m = self.heights_m.is_some().then(|| heights_around(higher_m));
-        let found = self.find_all(arm, higher_m, heights_m.as_ref())?;
+        let last = self.last.take();
+        let found = self.find_all(arm, higher_m, heights_m.as_ref());
+        self.last = last;
+        let found = found?;
         let sure = found.iter().enumerate().filter(|(_, (target, _))| target.score >= sdg_robot::SURE);
         let nearest = sure.min_by(|(_, (a, _)), (_, (b, _))| apart_m(a).total_cmp(&apart_m(b)));
         let nearest = nearest.map(|(idx, _)| idx);

@@ -189,6 +189,22 @@ fn an_unknown_axis_names_the_known_ones() {
 }
 
 #[test]
+fn a_run_without_common_pictures_is_no_comparison() {
+    let folder = Folder::new();
+    let (out, other) = (folder.path("out"), folder.path("other"));
+    let axes = Path::new(&other).join("axes");
+    fs::create_dir_all(&axes).unwrap();
+    // The record of another part.
+    fs::write(axes.join("S-pendulum.tilt.json"), "{}").unwrap();
+    let of = ["evaluate", "--axes", "tilt", "--axis-views", "1", "--models", "S", "--objects", "rod_end"];
+    let output = sdg(&[&of[..], &["--out", &out, "--against", &other]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains(&format!("--against {other}: expected results")), "{stderr}");
+    assert!(Path::new(&out).join("axes.md").exists());
+}
+
+#[test]
 fn wrong_usage_is_exit_code_2() {
     let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     for arguments in [
@@ -211,6 +227,8 @@ fn wrong_usage_is_exit_code_2() {
         vec!["evaluate", "--axis-views", "3"],
         vec!["evaluate", "--axes", "tilt", "--axis-views", "0"],
         vec!["evaluate", "--axes", "tilt", "--search-points", "2"],
+        vec!["evaluate", "--axes", "shake", "--against", "other"],
+        vec!["evaluate", "--cameras", "webcam,webcam"],
         vec!["demo", "--time-budget", "-3"],
     ] {
         assert_eq!(sdg(&arguments).status.code(), Some(2), "{arguments:?}");

@@ -44,6 +44,9 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
     let told = String::from_utf8_lossy(&taught.stdout).into_owned();
     assert!(told.contains("marks 16.0 mm above the table"), "{told}");
+    let sizes =
+        "sizes from 0.9 to 1.11 times the part's size; without one, from 0.75 to 1.35 times the size in the photo";
+    assert!(told.contains(sizes), "{told}");
 
     let (model, photo) = (files.path("part.sdg"), shipped("pendulum", "image.png"));
     let detect = |json: &[&str]| {

@@ -162,6 +162,9 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
     grasp(&inside, &["--place", "shelf"], 1, &["carry: no path to \"shelf\"", "wall"]);
     let rehearse = ["rehearse", "--grasp-model", &model, "--object", "pendulum", "--place", "shelf"];
     refused(&rehearse, 2, &["--workcell"]);
+    let other_arm = folder.text("fr3.toml", &(workcell_toml().replace("\"panda\"", "\"fr3\"") + PLACES));
+    let expected = "fr3.toml: model: expected \"panda\", the simulated arm, found \"fr3\"";
+    refused(&[&rehearse[..], &["--workcell", &other_arm]].concat(), 1, &[expected]);
 }
 
 #[test]

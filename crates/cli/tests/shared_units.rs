@@ -352,3 +352,25 @@ fn the_submit_script_is_one_that_bash_reads() {
         refused(&command.output().unwrap(), 1, &["sbatch"]);
     }
 }
+
+#[test]
+fn submitted_jobs_are_told() {
+    let folder = Folder::new();
+    let out = folder.path("a run");
+    let submit = |words: Vec<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+        // A function of bash instead of Slurm's program.
+        command.args(words).env("BASH_FUNC_sbatch%%", "() { echo '41;cluster'; }");
+        command.output().unwrap()
+    };
+    let words = arguments(&out, &["--submit", "slurm", "--yes"]);
+    let printed = json(&submit(words.clone()));
+    assert_eq!(printed, serde_json::json!({ "jobs": ["41", "41", "41"], "units": 4, "out": out }));
+    let printed = submit(words.into_iter().filter(|word| *word != "--json").collect());
+    let printed = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.starts_with("teach: job 41, 1 units\n"), "{printed}");
+    assert!(
+        printed.contains(&format!("--watch '{out}'; ")) && printed.contains(&format!("--out '{out}' ")),
+        "{printed}"
+    );
+}

@@ -22,8 +22,6 @@ const COUNT: u64 = 24;
 /// Maximum number of pixels of a sample: that of the pictures in the paper that this project implements. Larger samples
 /// take longer.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
-/// Range of the part's size in the samples, relative to the photo, for a model that knows its part's size.
-const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
 
 /// The held-out samples of a teaching run.
 pub struct HeldBackSamples(Augmenter);
@@ -82,9 +80,8 @@ impl HeldBackFigures {
         let detector = Perception::of_any_camera(model.clone().with_region(None)?);
         let model = detector.model();
         let facts = model.facts();
-        let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
         let (alone, others_in_photo) = without_unmarked_parts(model, demonstrations)?;
-        let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
+        let samples = HeldBackSamples::new(&alone, &model.held_out_sizes(), seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
         let judged = (0..COUNT).into_par_iter().map(|number| {
             let sample = samples.sample(number);

@@ -13,6 +13,8 @@ const ASSUMED_FRICTION: f64 = 0.6;
 /// Maximum resolution of the model's photo, in pixels per metre: approximately that of the wrist camera on the table. A
 /// finer photo is reduced to it.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
+/// Maximum difference between a given height and the model's, in mm: lengths are told to a tenth of a millimetre.
+const SAME_HEIGHT_MM: f64 = 0.05;
 /// Maximum assumed mass of a body, in kg: the maximum load of the arm.
 const MAX_ASSUMED_KG: f64 = 3.0;
 
@@ -63,6 +65,9 @@ pub enum OwnPartError {
     /// The length is both given and known.
     #[error("expected a model taught without a camera, found one whose part is {known_mm:.1} mm long")]
     LengthIsKnown { known_mm: f64 },
+    /// The given height is not the known one.
+    #[error("expected a model taught without a camera, found one whose marks are {known_mm:.1} mm above the table")]
+    HeightIsKnown { known_mm: f64 },
 }
 
 impl OwnPart {
@@ -91,6 +96,10 @@ impl OwnPart {
             }
         };
         let height_m = match (sizes.height_mm, known) {
+            // The arm uses the model's height, except for marks so low or so high that there is no such body.
+            (Some(height_mm), Some(lengths)) if is_body(lengths) && !is_same(height_mm, lengths) => {
+                return Err(OwnPartError::HeightIsKnown { known_mm: 1e3 * lengths.mark_height_m }.into());
+            }
             (Some(height_mm), _) => 1e-3 * height_mm,
             (None, Some(lengths)) => lengths.mark_height_m,
             (None, None) => return Err(OwnPartError::NeedsHeight.into()),
@@ -145,4 +154,14 @@ impl OwnPart {
         };
         Ok(OwnPart { object, model, facts })
     }
+}
+
+/// Whether a body can have the height of the model's marks.
+fn is_body(lengths: &Lengths) -> bool {
+    let [min_m, max_m] = Extrusion::HEIGHTS_M;
+    (min_m..=max_m).contains(&lengths.mark_height_m)
+}
+
+fn is_same(height_mm: f64, lengths: &Lengths) -> bool {
+    (height_mm - 1e3 * lengths.mark_height_m).abs() <= SAME_HEIGHT_MM
 }

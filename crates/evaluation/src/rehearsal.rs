@@ -113,8 +113,9 @@ pub struct Rehearsed {
     pub attempts: Vec<AttemptSummary>,
     /// External pictures of the first successful attempt, or of the last recorded one.
     pub film: Vec<RgbImage>,
-    /// The wrist camera's last picture before the approach of each attempt, with the detection drawn.
-    pub views: Vec<RgbImage>,
+    /// The wrist camera's last picture before the approach of each attempt, with the detection drawn; `None` if no
+    /// picture was taken.
+    pub views: Vec<Option<RgbImage>>,
     /// Whether parts were put down.
     pub is_placing: bool,
 }
@@ -165,7 +166,7 @@ pub struct RehearsedAttempt {
     pub looks: Looks,
     /// External pictures, if requested.
     pub frames: Vec<RgbImage>,
-    /// The wrist camera's last picture, with the detection drawn.
+    /// The wrist camera's last picture before the approach, with the detection drawn.
     pub view: Option<RgbImage>,
 }
 
@@ -182,7 +183,7 @@ impl Rehearsal<'_> {
                 rehearsed.film = frames;
                 filmed_success = attempt.success;
             }
-            rehearsed.views.extend(view);
+            rehearsed.views.push(view);
             let observed = observe(&attempt);
             rehearsed.attempts.push(attempt);
             if observed.is_break() {

@@ -50,7 +50,7 @@ pub fn rehearsal(page: &RunPage) -> Result<Report> {
         lifted(page)
     ));
     let report = with_film(with_key_figures(report, page), page)?;
-    Ok(report.section(attempts(page)).section(last_looks(page)).section(this_run(page)).footer(FOOTER))
+    Ok(report.section(attempts(page)).section(last_looks(page.rehearsed)).section(this_run(page)).footer(FOOTER))
 }
 
 /// The page of `sdg demo`.
@@ -175,17 +175,13 @@ fn attempts(page: &RunPage) -> Section {
         ))
 }
 
-fn last_looks(page: &RunPage) -> Section {
-    let figures = page
-        .rehearsed
-        .views
-        .iter()
-        .zip(&page.rehearsed.attempts)
-        .take(12)
-        .map(|(view, attempt)| Figure::photo(view.clone()).caption(format!("Attempt {}", attempt.number)));
+fn last_looks(rehearsed: &Rehearsed) -> Section {
+    let figures = rehearsed.views.iter().zip(&rehearsed.attempts).filter_map(|(view, attempt)| {
+        Some(Figure::photo(view.clone()?).caption(format!("Attempt {}", attempt.number)))
+    });
     Section::new("Last looks")
         .lead("The wrist camera's pictures before the hand went down.")
-        .gallery(GallerySize::Medium, figures.collect())
+        .gallery(GallerySize::Medium, figures.take(12).collect())
 }
 
 fn this_run(page: &RunPage) -> Section {
@@ -210,4 +206,34 @@ fn this_run(page: &RunPage) -> Section {
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ])
         .command(page.command)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::RgbImage;
+    use sdg_report::AttemptSummary;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_has_the_number_of_its_attempt() {
+        let attempt = |number| AttemptSummary {
+            number,
+            object_mm: [0.0; 2],
+            object_angle_deg: 0.0,
+            detection_error: None,
+            step: 0,
+            success: false,
+            why: String::new(),
+            duration_secs: 0.0,
+        };
+        let rehearsed = Rehearsed {
+            attempts: vec![attempt(1), attempt(2)],
+            film: Vec::new(),
+            views: vec![None, Some(RgbImage::new(8, 8))],
+            is_placing: false,
+        };
+        let page = Report::new("rehearsal").section(last_looks(&rehearsed)).to_html().unwrap();
+        assert!(page.contains("Attempt 2") && !page.contains("Attempt 1"), "{page}");
+    }
 }

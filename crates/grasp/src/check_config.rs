@@ -34,6 +34,9 @@ impl CheckConfig {
     /// Size range in a plan view, where the size is known. It is wide enough that look-alikes of another size are
     /// found, and then refused because of the size.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
+    /// Size range of held-out samples for a model that knows its part's size: parts of other sizes are refused. Chosen
+    /// by hand.
+    pub const KNOWN_SAMPLE_SIZES: RangeInclusive<f64> = 0.97..=1.03;
     /// Default maximum number of detections in one picture. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
 

@@ -54,17 +54,48 @@ impl GraspModel {
         poses.into_iter().map(|pose| pose.and_then(at)).collect()
     }
 
-    /// The demonstration to which the detection's outline belongs, and the position of its cut-out in the image.
+    /// The detection's demonstration, and the position of its cut-out in the image.
     fn pose_of(&self, detection: &GraspDetection) -> Option<(usize, PlanarSimilarity)> {
         let seen = &detection.outline.as_ref()?.vertices;
-        self.demonstrations.iter().enumerate().find_map(|(idx, demonstration)| {
-            let taught = demonstration.outline(&PlanarSimilarity::IDENTITY).vertices;
-            if taught.len() != seen.len() {
-                return None;
-            }
-            let pose = PlanarSimilarity::fit(&taught, seen)?;
-            let is_near = taught.iter().zip(seen).all(|(from, to)| (pose.apply(from) - to).norm() <= MAX_OFF_PX);
-            is_near.then_some((idx, pose))
-        })
+        let idx = detection.demonstration_idx;
+        let taught = self.demonstrations.get(idx)?.outline(&PlanarSimilarity::IDENTITY).vertices;
+        if taught.len() != seen.len() {
+            return None;
+        }
+        let pose = PlanarSimilarity::fit(&taught, seen)?;
+        let is_near = taught.iter().zip(seen).all(|(from, to)| (pose.apply(from) - to).norm() <= MAX_OFF_PX);
+        is_near.then_some((idx, pose))
+    }
+}
+
+#[cfg(all(test, feature = "teach"))]
+mod tests {
+    use super::*;
+    use crate::drawn_part;
+    use crate::model::Verification;
+    use image::Rgb;
+    use sdg_demonstration::Demonstration;
+
+    #[test]
+    fn a_picture_is_compared_with_the_photo_of_the_detection() {
+        let plain = drawn_part::demonstration([320, 240]);
+        // The other side of the part has the same outline, and stripes on its foot.
+        let mut image = plain.image.clone();
+        for left in [104, 112] {
+            (86..102).for_each(|y| (left..left + 4).for_each(|x| image.put_pixel(x, y, Rgb([20, 20, 60]))));
+        }
+        let striped = Demonstration { image, annotation: plain.annotation.clone() };
+        let picture = striped.image.clone();
+        let model = drawn_part::taught(&[plain, striped]);
+        let found = model.detect(&picture, Verification::ByShape).unwrap().swap_remove(0);
+        assert_eq!(found.demonstration_idx, 1);
+        let num_differences = |detection: &GraspDetection| {
+            let Differences { edges, surface, features } =
+                model.differences(&picture, &[detection]).swap_remove(0).unwrap();
+            edges.len() + surface.len() + features.len()
+        };
+        let with_plain = GraspDetection { demonstration_idx: 0, ..found.clone() };
+        let counts = [num_differences(&found), num_differences(&with_plain)];
+        assert!(counts[0] < counts[1], "{counts:?}");
     }
 }

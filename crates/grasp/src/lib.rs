@@ -24,7 +24,7 @@
 //! | evidence | measurements at a pose (edges, surface, hue, visible fraction, size …), each of which adds log-odds to the score |
 //! | score | logistic function of the sum of log-odds, in (0, 1); a detection of at least 0.5 is accepted |
 //! | agreement | edges and surface together, in [0, 1], from `sdg-shape` |
-//! | `log_size` | ln of the size in the image over the nearest nominal size |
+//! | `log_size` | ln of the size in the image over that in the photo, in pixels |
 //! | x, y, angle, width | a planar grasp: centre in pixels, angle of the grasp line from x towards y, opening in pixels |
 //! | tcp, flange, base | frames of the arm; metres, z of the tcp along the approach |
 //!

@@ -175,6 +175,11 @@ impl GraspModel {
         self.demonstrations[0].check().search.scales.clone()
     }
 
+    /// The range of a part's size in held-out samples, relative to the photo: sizes at which it is accepted.
+    pub fn held_out_sizes(&self) -> RangeInclusive<f64> {
+        if self.facts.lengths.is_some() { CheckConfig::KNOWN_SAMPLE_SIZES } else { self.size_tolerance() }
+    }
+
     pub(crate) fn with_check(self, change: impl Fn(&mut CheckConfig)) -> Result<Self> {
         let changed = |demonstration: TaughtDemonstration| {
             let mut check = demonstration.check().clone();
@@ -239,8 +244,7 @@ impl GraspModel {
         };
         found.iter_mut().for_each(|found| window.in_whole(found));
         found.retain(|found| counts(&found.detection));
-        found.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
-        drop_repeated(&mut found);
+        drop_repeated(&mut found, |found| &found.detection);
         found.truncate(self.demonstrations[0].check().max_detections);
         Ok(found)
     }
@@ -250,7 +254,7 @@ impl GraspModel {
         let (level, slant) = self.find_at_slant(image, shot, true).await?;
         let Some(made_level) = slant.and_then(|slant| LevelImage::new(image, shot, &slant)) else { return Ok(level) };
         let (found, _) = self.find_at_slant(&made_level.image, &made_level.shot(), false).await?;
-        if explains_more(&found, &level) {
+        if explains_more(&each_part_once(&found), &each_part_once(&level)) {
             return Ok(found.into_iter().filter_map(|found| made_level.seen(found)).collect());
         }
         Ok(level)
@@ -329,10 +333,10 @@ impl GraspModel {
 
     /// The verdict's inputs for a sighting.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
-        let PlacedDemonstration { demonstration_idx, evidence, log_size, .. } = sighting.placed;
+        let PlacedDemonstration { demonstration_idx, evidence, image_from_cutout, .. } = sighting.placed;
         let network = self.score_calibration.log_likelihood_ratio(sighting.network_score);
         let resemblance = self.score_calibration.resemblance;
-        Clues { demonstration_idx, evidence, log_size, network, resemblance }
+        Clues { demonstration_idx, evidence, log_size: image_from_cutout.scale.ln(), network, resemblance }
     }
 
     /// The scores of all sightings in one picture of a sequence. `earlier_log_sizes` are the sizes of parts in earlier
@@ -351,25 +355,34 @@ impl GraspModel {
     }
 }
 
-/// Keeps the best of several detections of the same part, which is recognised by the overlap of outlines or, without
-/// outlines, of boxes. Of detections that converged to the same pose, the one with the highest network score is kept,
-/// so that the result does not depend on the last bits of the scores.
-fn drop_repeated(found: &mut Vec<Found>) {
+/// Sorts, best score first, and keeps the best of several detections of the same part, which is recognised by the
+/// overlap of outlines or, without outlines, of boxes. Of detections that converged to the same pose, the one with the
+/// highest network score is kept, so that the result does not depend on the last bits of the scores.
+fn drop_repeated<T>(found: &mut Vec<T>, detection: impl Fn(&T) -> &GraspDetection) {
     // Chosen by hand: above the rounding of single precision, below any difference that distinguishes poses.
     const SAME_SCORE: f64 = 1e-4;
-    let mut kept: Vec<Found> = Vec::with_capacity(found.len());
+    found.sort_by(|a, b| detection(b).score.total_cmp(&detection(a).score));
+    let mut kept: Vec<T> = Vec::with_capacity(found.len());
     for next in found.drain(..) {
-        match kept.iter_mut().find(|better| are_of_same_part(&better.detection, &next.detection)) {
+        match kept.iter_mut().find(|better| are_of_same_part(detection(better), detection(&next))) {
             None => kept.push(next),
             Some(better) => {
-                let as_good = better.detection.score - next.detection.score < SAME_SCORE;
-                if as_good && next.detection.network_score > better.detection.network_score {
+                let (one, other) = (detection(better), detection(&next));
+                let as_good = one.score - other.score < SAME_SCORE;
+                if as_good && other.network_score > one.network_score {
                     *better = next;
                 }
             }
         }
     }
     *found = kept;
+}
+
+/// The detections of [`drop_repeated`]: network and search can each find the same part.
+fn each_part_once(found: &[Found]) -> Vec<&GraspDetection> {
+    let mut detections: Vec<&GraspDetection> = found.iter().map(|found| &found.detection).collect();
+    drop_repeated(&mut detections, |&detection| detection);
+    detections
 }
 
 pub(crate) fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> bool {
@@ -411,8 +424,23 @@ mod tests {
         ]
         .map(|detection| Found { detection, placement: None })
         .into();
-        drop_repeated(&mut found);
+        drop_repeated(&mut found, |found| &found.detection);
         let kept: Vec<_> = found.iter().map(|kept| (kept.detection.bbox.x1, kept.detection.network_score)).collect();
         assert_eq!(kept, [(0.0, 0.7), (100.0, 0.2)]);
+    }
+
+    #[test]
+    fn parts_found_by_network_and_search_count_once_for_a_slant() {
+        let found = |all: &[(f64, f64)]| -> Vec<Found> {
+            let found_at = |&(x, agreement)| {
+                let detection = GraspDetection { agreement: Some(agreement), ..detection(x, 0.9, 0.0) };
+                Found { detection, placement: None }
+            };
+            all.iter().map(found_at).collect()
+        };
+        let level = found(&[(0.0, 0.7), (100.0, 0.7), (1.0, 0.7), (101.0, 0.7)]);
+        let slanted = found(&[(0.0, 0.75), (100.0, 0.75)]);
+        assert!(explains_more(&each_part_once(&slanted), &each_part_once(&level)));
+        assert!(!explains_more(&each_part_once(&level), &each_part_once(&slanted)));
     }
 }

@@ -81,6 +81,8 @@ pub(crate) fn scaling(factor: f64) -> PlanarSimilarity {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "teach")]
+    use crate::{drawn_part, model::Verification};
 
     const TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
 
@@ -111,5 +113,40 @@ mod tests {
         );
         assert!(frame.distance(0.3) == 0.0 && (frame.distance(0.5) - (0.5f64 / 0.45).ln()).abs() < 1e-12);
         assert!((frame.clamp(0.9) - 0.45).abs() < 1e-12);
+    }
+
+    /// The log-odds of the sizes of two drawn parts in a picture of this width and height; `scales` are their sizes
+    /// relative to the photo of 320 × 240 pixels.
+    #[cfg(feature = "teach")]
+    fn size_terms(tolerance: RangeInclusive<f64>, picture: [u32; 2], scales: [f64; 2]) -> [f64; 2] {
+        let model = drawn_part::model([320, 240]).with_size_tolerance(tolerance).unwrap();
+        let [width, height] = picture.map(f64::from);
+        let places = [(0.25 * width, 0.35 * height, 20.0), (0.7 * width, 0.6 * height, 140.0)];
+        let [one, other] = [0, 1].map(|k| {
+            let (x, y, angle_deg) = places[k];
+            let scaled = scaling(scales[k]);
+            scaled.compose(&drawn_part::at(x / scales[k], y / scales[k], angle_deg))
+        });
+        let seen = drawn_part::picture(picture, &[one, other]);
+        let found = model.detect(&seen, Verification::ByShape).unwrap();
+        [one, other].map(|pose| {
+            let center = drawn_part::line().transformed(&pose).center();
+            let at_it = found.iter().find(|detection| (detection.grasp.center() - center).norm() < 2.0);
+            at_it.unwrap_or_else(|| panic!("{center}: {found:?}")).evidence.unwrap().size
+        })
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
+    fn parts_of_one_picture_have_one_size_in_pixels() {
+        // A picture of five sixths of the photo's pixels per side, searched once for both nominal sizes. The two sizes
+        // differ by 4 % and are next to different nominal sizes.
+        let middle = (200.0f64 / 240.0).sqrt();
+        let terms = size_terms(0.8..=1.2, [267, 200], [0.98 * middle, 1.02 * middle]);
+        assert!(terms.iter().all(|term| *term > -0.8), "{terms:?}");
+        // Twice the pixels per side, searched separately for each nominal size: of two parts with different nominal
+        // sizes, one has another size than the best.
+        let terms = size_terms(TOLERANCE, [640, 480], [1.0, 2.0]);
+        assert!(terms.contains(&0.0) && terms.iter().any(|term| *term < -2.8), "{terms:?}");
     }
 }

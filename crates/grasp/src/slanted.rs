@@ -14,6 +14,8 @@ use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
 use sdg_shape::{PlanViewMap, parallel};
 
 use crate::detection::{Found, GraspDetection};
+use crate::facts::TurnSource;
+use crate::same_part::are_outlines_of_same_part;
 use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, agreement_in, foreshortening, usual_focal_px};
 
@@ -55,12 +57,13 @@ const MAX_REACH: f64 = 0.75;
 const MARGIN: f64 = 0.2;
 
 /// Whether the accepted detections in the rectified picture agree clearly better, in sum, than those in the picture
-/// itself. Scores cannot decide this: a slightly wrong pose scores as high as the right one.
-pub(crate) fn explains_more(slanted: &[Found], level: &[Found]) -> bool {
-    fn accepted(found: &[Found]) -> impl Iterator<Item = &GraspDetection> {
-        found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted())
+/// itself; each list has a part at most once. Scores cannot decide this: a slightly wrong pose scores as high as the
+/// right one.
+pub(crate) fn explains_more(slanted: &[&GraspDetection], level: &[&GraspDetection]) -> bool {
+    fn accepted<'a>(found: &[&'a GraspDetection]) -> impl Iterator<Item = &'a GraspDetection> {
+        found.iter().copied().filter(|detection| detection.is_accepted())
     }
-    let worth = |found: &[Found]| accepted(found).filter_map(|detection| detection.agreement).sum::<f64>();
+    let worth = |found: &[&GraspDetection]| accepted(found).filter_map(|detection| detection.agreement).sum::<f64>();
     let is_sure = accepted(level).next().is_some() || accepted(slanted).any(|detection| detection.score >= SURE);
     is_sure && worth(slanted) > worth(level) + SLANT_GAIN
 }
@@ -88,9 +91,7 @@ pub(crate) fn suggested_slant(
     sightings: &[Sighting<'_>],
     searched: &SearchedImage<'_>,
 ) -> Option<Slant> {
-    let mut best: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
-    best.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
-    best.truncate(NUM_SLANT_PLACES);
+    let best = best_places(sightings);
     let shortened = parallel::map(&best, |sighting| {
         let fit = foreshortening(searched, &sighting.placed)?;
         let bounds = sighting.placed.outline().bounds();
@@ -139,8 +140,27 @@ pub(crate) fn suggested_slant(
     (best_gain(&gains) >= required).then_some(slant)
 }
 
-/// Number of places with different parts. A network and the search can find the same part at slightly different poses,
-/// which are no independent evidence.
+/// The sightings of best agreement. Of a part found by both network and search, only the better one: it takes one place,
+/// so that other parts also count. Matches of the search alone are apart.
+fn best_places<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Vec<&'s Sighting<'a>> {
+    let is_searched = |sighting: &Sighting<'_>| sighting.turn_source == TurnSource::Search;
+    let is_same = |one: &Sighting<'_>, other: &Sighting<'_>| {
+        !(is_searched(one) && is_searched(other))
+            && are_outlines_of_same_part(&one.placed.outline(), &other.placed.outline())
+    };
+    let mut likely: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
+    likely.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
+    let mut best: Vec<&Sighting<'_>> = Vec::with_capacity(NUM_SLANT_PLACES);
+    for sighting in likely {
+        if best.len() < NUM_SLANT_PLACES && !best.iter().any(|better| is_same(better, sighting)) {
+            best.push(sighting);
+        }
+    }
+    best
+}
+
+/// Number of places with different parts. Searches with two photos or for two sizes can find the same part at slightly
+/// different poses, which are no independent evidence.
 fn num_parts(places: &[Shortened]) -> usize {
     let is_first = |(idx, place): &(usize, &Shortened)| {
         places[..*idx].iter().all(|other| (place.at - other.at).norm() > place.reach.max(other.reach))
@@ -406,6 +426,28 @@ mod tests {
         }
     }
 
+    /// A similarity does not describe the shortened plate, so that only the search has its outline and its grasp.
+    #[cfg(feature = "teach")]
+    #[test]
+    fn a_tracked_plate_at_rest_stays_where_the_search_has_it() {
+        use crate::tracking::{Tracker, TrackerConfig};
+        use std::{sync::Arc, time::Duration};
+
+        let slant = slant(30.0);
+        let seen = Arc::new(picture(|seen| slant.level_from_picture(seen)));
+        let mut tracker = Tracker::new(plate_model().into(), TrackerConfig::default());
+        tracker.frame(Arc::clone(&seen), Duration::ZERO);
+        let search = tracker.search_before_answer().unwrap();
+        let found = tracker.answer(search.run()).unwrap().swap_remove(0).detection;
+        assert!(is_plate(&found, &slant, &Isometry2::identity(), 2.0), "{found:?}");
+        for number in 1..4 {
+            let parts = tracker.frame(Arc::clone(&seen), Duration::from_millis(100 * number));
+            assert!(tracker.search_before_answer().is_none(), "the frame continues the one before");
+            let followed = &parts[0].detection;
+            assert_eq!((followed.grasp, &followed.outline), (found.grasp, &found.outline), "frame {number}");
+        }
+    }
+
     #[test]
     fn places_far_apart_tell_the_lens() {
         let usual_px = 700.0;
@@ -435,5 +477,50 @@ mod tests {
         let at =
             |x: f64| Shortened { at: Vector2::new(x, 5.0), reach: 40.0, shortening: Vector2::zeros(), weight: 0.5 };
         assert_eq!(num_parts(&[at(0.0), at(3.0), at(100.0), at(-2.0)]), 2);
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
+    fn a_part_found_by_network_and_search_takes_one_place() {
+        use crate::colors::Colors;
+        use crate::taught::TaughtDemonstration;
+        use crate::verification::PlacedDemonstration;
+        use sdg_shape::Evidence;
+
+        let taught = TaughtDemonstration::new(&crate::teach::tests::demonstration()).unwrap();
+        let sighting = |x: f64, agreement: f64, turn_source: TurnSource| {
+            let pose = PlanarSimilarity::translation(x, 0.0);
+            let placed = PlacedDemonstration {
+                demonstration: &taught,
+                demonstration_idx: 0,
+                image_from_cutout: pose,
+                image_from_marks: pose,
+                colors: Colors::There,
+                agreement,
+                evidence: Evidence {
+                    edges: agreement,
+                    surface: None,
+                    hue_shift: 0.0,
+                    visible: 1.0,
+                    outside: 0.0,
+                    close: None,
+                },
+                light: 1.0,
+            };
+            Sighting { placed, network_score: 0.0, keypoint_scores: Vec::new(), turn_source }
+        };
+        let places = |sightings: &[Sighting<'_>]| -> Vec<f64> {
+            best_places(sightings).iter().map(|sighting| sighting.placed.image_from_cutout.tx).collect()
+        };
+        let five = |of_network: TurnSource| {
+            let twice = |k: i32| {
+                let (x, agreement) = (200.0 * f64::from(k), 0.9 - 0.1 * f64::from(k));
+                [sighting(x, agreement, of_network), sighting(x + 2.0, agreement - 0.01, TurnSource::Search)]
+            };
+            (0..5).flat_map(twice).collect::<Vec<_>>()
+        };
+        assert_eq!(places(&five(TurnSource::Keypoints)), [0.0, 200.0, 400.0, 600.0]);
+        // The search alone has already decided which of its matches are apart.
+        assert_eq!(places(&five(TurnSource::Search)), [0.0, 2.0, 200.0, 202.0]);
     }
 }

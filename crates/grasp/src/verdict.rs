@@ -141,7 +141,7 @@ impl Contributions {
 pub(crate) struct Clues {
     pub(crate) demonstration_idx: usize,
     pub(crate) evidence: Evidence,
-    /// ln of the size over the nearest nominal size of this demonstration.
+    /// ln of the size in the image over that in this demonstration's photo, in pixels.
     pub(crate) log_size: f64,
     /// ln of the ratio of two likelihoods of the network's output, on the part and elsewhere; `None` without a network.
     pub(crate) network: Option<f64>,

@@ -152,8 +152,6 @@ pub(crate) struct PlacedDemonstration<'a> {
     /// Agreement of edges and surface together, in `[0, 1]`.
     pub(crate) agreement: f64,
     pub(crate) evidence: Evidence,
-    /// ln of the size over the nearest nominal size.
-    pub(crate) log_size: f64,
     /// Mean brightness at the pose divided by that of the demonstration.
     pub(crate) light: f64,
 }
@@ -245,7 +243,6 @@ impl<'a> SizedDemonstration<'a> {
             colors: self.colors,
             agreement,
             evidence,
-            log_size: self.range.log_size(image_from_cutout.scale),
             light: self.prepared.search.brightness(&view.image, view_from_working),
         }
     }

@@ -48,6 +48,9 @@ const MIN_INSIDE: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct Surface {
     cells: Vec<Cell>,
+    /// Points of a part that is too thin for points with a distance of [`EDGE_MARGIN_PX`] from the outline; their
+    /// colours are not compared. Empty for other parts.
+    thin: Vec<Point2<f64>>,
     is_plain: bool,
     config: SurfaceConfig,
 }
@@ -97,33 +100,39 @@ impl Surface {
         let (columns, rows) = ((bounds.width() / step) as usize, (bounds.height() / step) as usize);
         let reader = PixelReader::new(cutout);
         let mut cells: BTreeMap<[usize; 2], Vec<_>> = BTreeMap::new();
+        let mut thin = Vec::new();
         for i in 0..rows * columns {
             let (row, column) = (i / columns, i % columns);
             let [right, down] = [column, row].map(|k| (k as f64 + 0.5) * step);
             let point = Point2::new(bounds.x1 + right, bounds.y1 + down);
-            if outline.contains(&point)
-                && outline.distance_to_edge(&point) >= EDGE_MARGIN_PX
-                && let Some(color) = color_at(&reader, &point)
-            {
+            if !outline.contains(&point) {
+                continue;
+            }
+            if outline.distance_to_edge(&point) < EDGE_MARGIN_PX {
+                thin.push(point);
+            } else if let Some(color) = color_at(&reader, &point) {
                 cells.entry([right, down].map(|d| (d / cell_side) as usize)).or_default().push((point, color));
             }
         }
+        if !cells.is_empty() {
+            thin.clear();
+        }
         let cells: Vec<Cell> = cells.into_values().map(|points| Cell::new(&points)).collect();
-        let mut made = Self { cells, is_plain: false, config: *config };
+        let mut made = Self { cells, thin, is_plain: false, config: *config };
         let mut whole = Correlation::default();
         made.correlations(cutout, &PlanarSimilarity::IDENTITY).iter().for_each(|cell| whole.merge(cell));
-        made.is_plain = whole.about_means()[0] < whole.floor(config.noise);
+        made.is_plain = made.cells.is_empty() || whole.about_means()[0] < whole.floor(config.noise);
         made
     }
 
-    /// Whether the demonstration's contrast is below noise, as in a black silhouette; correlations with it then carry
-    /// no information.
+    /// Whether the demonstration's contrast is below noise, as in a black silhouette, or the part is too thin for
+    /// points; correlations with it then carry no information.
     pub fn is_plain(&self) -> bool {
         self.is_plain
     }
 
     fn points(&self) -> impl Iterator<Item = &Point2<f64>> {
-        self.cells.iter().flat_map(|cell| &cell.points)
+        self.cells.iter().flat_map(|cell| &cell.points).chain(&self.thin)
     }
 
     /// For each cell, sums over its points of the demonstration's and the image's colours at a pose.
@@ -456,6 +465,18 @@ mod tests {
         let silhouette = RgbImage::from_pixel(120, 80, Rgb([12; 3]));
         assert!(Surface::new(&silhouette, &outline, &SurfaceConfig::default()).is_plain());
         assert!(!surface().is_plain());
+    }
+
+    #[test]
+    fn a_strip_too_thin_for_points_is_plain_and_overlaps_itself() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 30.0, y1: 40.0, x2: 90.0, y2: 43.0 });
+        let strip = Surface::new(&plate(1.0, false), &outline, &SurfaceConfig::default());
+        assert!(strip.is_plain() && strip.cells.is_empty());
+        let has_inside = |right: f64| strip.has_inside(&outline, &PlanarSimilarity::translation(right, 0.0), 0.3);
+        assert!(has_inside(0.0) && has_inside(40.0) && !has_inside(45.0));
+        assert_eq!(strip.share_inside_roughly(&outline, &PlanarSimilarity::IDENTITY), 1.0);
+        // Other parts have no points near their outline.
+        assert!(surface().thin.is_empty());
     }
 
     #[test]

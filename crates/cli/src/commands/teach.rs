@@ -75,7 +75,8 @@ pub struct TeachArgs {
     pub symmetry: RotationalSymmetry,
     /// Smallest and largest size of the part in a picture, relative to its size in the photo: 0.95-1.05 if the camera's
     /// height is constant, which also distinguishes parts of different sizes; a wider range if the height varies, or if
-    /// the photo was both cropped and resized
+    /// the photo was both cropped and resized. With a calibrated camera, 0.9 to 1.11 times the part's size is searched
+    /// instead
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
     /// Search only this part of pictures: left edge, upper edge, width and height in pixels of the photo. A part counts
@@ -241,7 +242,17 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("taught \"{object}\" in {seconds:.1} s, of which the teaching took {:.1} s{training}", facts.seconds);
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
-        println!("searches sizes from {} to {} times the size in the photo", tolerance.start(), tolerance.end());
+        let by_photo = format!("from {} to {} times the size in the photo", tolerance.start(), tolerance.end());
+        if facts.lengths.is_some() {
+            let known = CheckConfig::KNOWN_SIZE_TOLERANCE;
+            println!(
+                "with a calibrated camera, searches sizes from {} to {} times the part's size; without one, {by_photo}",
+                known.start(),
+                known.end()
+            );
+        } else {
+            println!("searches sizes {by_photo}");
+        }
         if let Some(region) = taught.model.region() {
             println!("searches {region} of pictures of the photo's size");
         }

@@ -21,7 +21,7 @@ pub(crate) use dry_run::print_plan;
 #[cfg(feature = "simulation")]
 pub(crate) use sdg_evaluation::draw_dry_run;
 #[cfg(feature = "simulation")]
-pub(crate) use simulated_scene::{check_simulated, check_table_height, simulated_scene};
+pub(crate) use simulated_scene::{check_simulated, simulated_scene};
 
 /// `--robot`: an address, or the simulated arm in this program.
 #[derive(Debug, Clone, PartialEq, Eq)]

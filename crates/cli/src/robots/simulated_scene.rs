@@ -38,14 +38,6 @@ pub(crate) fn check_simulated(workcell: &Workcell, path: &Path) -> Result<()> {
         let found = workcell.robot.name();
         bail!("{}: model: expected \"panda\", the simulated arm, found \"{found}\"", path.display());
     }
-    check_table_height(workcell, path)
-}
-
-/// Rejects a workcell whose table is not at the height of the base, as the simulated one is.
-///
-/// # Errors
-/// Another height; the error names the workcell's file.
-pub(crate) fn check_table_height(workcell: &Workcell, path: &Path) -> Result<()> {
     if workcell.table_height_m != 0.0 {
         let found_mm = workcell.table_height_m * 1e3;
         bail!("{}: height_mm: expected 0, the simulated table's height, found {found_mm}", path.display());

@@ -30,9 +30,7 @@ pub fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
         line(format!("false alarms on {} pictures without the part", totals.false_alarms));
     }
     for (kind, totals) in by_kind(&evaluated.tested.iter().collect::<Vec<_>>(), evaluated.min_score) {
-        let with_part = format!("found {} parts, {} wrong", totals.found, totals.wrong);
-        let without_part = format!("false alarms on {} pictures", totals.false_alarms);
-        line(format!("{kind}: {}", if totals.clean.of > 0 { with_part } else { without_part }));
+        line(format!("{kind}: {}", of_kind(&totals)));
     }
     if let Some(errors) = totals.errors {
         let mm = |mm: Option<f64>| mm.map(|mm| format!(" = {mm:.2} mm")).unwrap_or_default();
@@ -58,4 +56,36 @@ pub fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
         line(format!("left out: {}: {}", left_out.file, left_out.why));
     }
     text
+}
+
+/// The counts of the pictures of one kind, with the part and without it.
+fn of_kind(totals: &Totals) -> String {
+    let with_part = (totals.clean.of > 0).then(|| format!("found {} parts, {} wrong", totals.found, totals.wrong));
+    let without_part = (totals.false_alarms.of > 0)
+        .then(|| format!("false alarms on {} pictures without the part", totals.false_alarms));
+    with_part.into_iter().chain(without_part).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::Share;
+
+    #[test]
+    fn a_kind_with_both_sorts_of_pictures_has_both_counts() {
+        let share = |count, of| Share { count, of };
+        let mixed = Totals {
+            found: share(2, 3),
+            missed: 1,
+            wrong: 4,
+            optional: share(0, 0),
+            clean: share(1, 2),
+            false_alarms: share(1, 5),
+            errors: None,
+        };
+        let both = "found 2 of 3 parts, 4 wrong; false alarms on 1 of 5 pictures without the part";
+        assert_eq!(of_kind(&mixed), both);
+        let with_part = Totals { false_alarms: share(0, 0), ..mixed };
+        assert_eq!(of_kind(&with_part), "found 2 of 3 parts, 4 wrong");
+    }
 }

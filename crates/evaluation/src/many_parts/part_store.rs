@@ -20,10 +20,10 @@ pub struct PartStore(PathBuf);
 
 /// The record of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PartRecord {
+pub struct PartRecord<O = PartOutcome> {
     /// The inputs of teaching: files, arguments, version.
     pub key: Value,
-    pub outcome: PartOutcome,
+    pub outcome: O,
 }
 
 /// The outcome of a teaching run.
@@ -45,7 +45,6 @@ pub enum PartOutcome {
         /// Median errors of the found parts: distance in pixels of the photo, and angle in degrees.
         median: Option<[f64; 2]>,
         /// Numbers of the photos, from 1, whose grasp points in another direction than that of the first photo.
-        #[serde(default)]
         turned_photos: Vec<usize>,
     },
     Failed {
@@ -102,20 +101,21 @@ impl PartStore {
         self.0.join("parts").join(format!("{part}.json"))
     }
 
-    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key, or if
-    /// the model file is missing.
+    /// The stored outcome of a part for this key; `None` if no outcome is stored, or only one for another key or with
+    /// other fields, as in a record from before `turned_photos`, or if the model file is missing.
     ///
     /// # Errors
-    /// The record cannot be read or is damaged.
+    /// The record cannot be read, or the file is not a record: it may be the marks of a photo, and is not replaced.
     pub fn read(&self, part: &str, key: &Value) -> Result<Option<PartOutcome>> {
         let path = self.record_file(part);
         if !path.exists() {
             return Ok(None);
         }
-        let record: PartRecord = serde_json::from_slice(&sdg_files::read(&path, MAX_RECORD_BYTES)?)
+        let record: PartRecord<Value> = serde_json::from_slice(&sdg_files::read(&path, MAX_RECORD_BYTES)?)
             .with_context(|| format!("{}: expected the record of a part", path.display()))?;
-        let is_missing = matches!(record.outcome, PartOutcome::Taught { .. }) && !self.model_file(part).exists();
-        Ok((record.key == *key && !is_missing).then_some(record.outcome))
+        let Ok(outcome) = serde_json::from_value::<PartOutcome>(record.outcome) else { return Ok(None) };
+        let is_missing = matches!(outcome, PartOutcome::Taught { .. }) && !self.model_file(part).exists();
+        Ok((record.key == *key && !is_missing).then_some(outcome))
     }
 
     /// Stores the outcome of a part. Without a model, an earlier model of the part is renamed to `NAME.sdg.before`. The
@@ -143,6 +143,28 @@ impl PartStore {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn an_outcome_without_a_field_is_not_used_and_another_file_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = PartStore::open(folder.path()).unwrap();
+        fs::write(store.model_file("lever"), b"model").unwrap();
+        let read = |record: &Value| {
+            fs::write(store.record_file("lever"), record.to_string()).unwrap();
+            store.read("lever", &Value::Null)
+        };
+        let mut record = json!({"key": null, "outcome": {"taught": {
+            "seconds": 1.5, "found": 19, "parts": 20, "wrong": 0, "false_alarms": 0, "without_part": 5,
+            "median": [0.5, 0.25],
+        }}});
+        assert_eq!(read(&record).unwrap(), None);
+        record["outcome"]["taught"]["turned_photos"] = json!([2]);
+        let Some(PartOutcome::Taught { turned_photos, .. }) = read(&record).unwrap() else { panic!("not used") };
+        assert_eq!(turned_photos, [2]);
+        let error = read(&json!({"images": [], "annotations": []})).unwrap_err().to_string();
+        assert!(error.ends_with("lever.json: expected the record of a part"), "{error}");
+    }
 
     #[test]
     fn a_failed_teaching_renames_the_earlier_model() {

@@ -105,8 +105,26 @@ impl Store {
     /// # Errors
     /// The errors of [`Self::read`].
     pub fn read_made_with<T: DeserializeOwned>(&self, name: &str, settings: &impl Serialize) -> Result<Option<T>> {
+        self.read_made_with_defaults(name, settings, &[])
+    }
+
+    /// Like [`Self::read_made_with`]; `defaults` are the settings of files in which they are missing, by name.
+    ///
+    /// # Errors
+    /// The errors of [`Self::read`].
+    pub(super) fn read_made_with_defaults<T: DeserializeOwned>(
+        &self,
+        name: &str,
+        settings: &impl Serialize,
+        defaults: &[(&str, Value)],
+    ) -> Result<Option<T>> {
         let path = self.folder.join(name);
-        let Some((made_with, record)) = read_stored(&path)? else { return Ok(None) };
+        let Some((mut made_with, record)) = read_stored(&path)? else { return Ok(None) };
+        if let Some(made_with) = made_with.as_object_mut() {
+            for (name, value) in defaults {
+                made_with.entry(*name).or_insert_with(|| value.clone());
+            }
+        }
         if let Some(difference) = difference(settings, &made_with)? {
             return Err(EvaluationError::OtherSettings { path, difference }.into());
         }

@@ -117,7 +117,8 @@ impl<'a> PreparedPart<'a> {
             if instance_idx.is_none() && picture.is_undecided(&placed) {
                 continue;
             }
-            let PlacedDemonstration { evidence, log_size, .. } = placed;
+            let PlacedDemonstration { evidence, image_from_cutout, .. } = placed;
+            let log_size = image_from_cutout.scale.ln();
             poses.push(PoseObservation {
                 clues: Clues { demonstration_idx: 0, evidence, log_size, network: None, resemblance },
                 instance_idx,

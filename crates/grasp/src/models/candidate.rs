@@ -45,12 +45,13 @@ pub(crate) struct PoseCandidate {
 }
 
 impl PoseCandidate {
-    /// The detection with the demonstration in this pose, and the score of the pose.
+    /// The detection with the demonstration in this pose in a picture of this width and height, and the score of the
+    /// pose.
     pub(super) fn in_pose(
         self,
         demonstration: &TaughtDemonstration,
         image_from_cutout: PlanarSimilarity,
-        picture_size: (u32, u32),
+        picture_size: [u32; 2],
         evidence: Option<ComparisonEvidence>,
     ) -> Self {
         let filled = consistency::filled(demonstration, &image_from_cutout, &self.bbox, picture_size);

@@ -32,7 +32,8 @@ const MAX_TURNED: usize = 2;
 pub(super) struct Comparer<'a> {
     network: &'a ComparisonNetwork,
     picture: Pyramid<'a>,
-    picture_size: (u32, u32),
+    /// Width and height of the whole picture.
+    picture_size: [u32; 2],
     demonstrations: &'a [TaughtDemonstration],
 }
 
@@ -40,12 +41,14 @@ pub(super) struct Comparer<'a> {
 type Compared = (PoseCandidate, Comparison);
 
 impl<'a> Comparer<'a> {
+    /// Prepares `image`, which may be a region of a picture of `picture_size`.
     pub(super) fn new(
         network: &'a ComparisonNetwork,
         image: &'a RgbImage,
+        picture_size: [u32; 2],
         demonstrations: &'a [TaughtDemonstration],
     ) -> Self {
-        Self { network, picture: Pyramid::new(image), picture_size: image.dimensions(), demonstrations }
+        Self { network, picture: Pyramid::new(image), picture_size, demonstrations }
     }
 
     /// The best of these candidates, each in its most likely pose and with its score, best first. The input must be

@@ -53,10 +53,10 @@ pub(super) fn filled(
     demonstration: &TaughtDemonstration,
     image_from_cutout: &PlanarSimilarity,
     bbox: &BoundingBox,
-    (width, height): (u32, u32),
+    picture_size: [u32; 2],
 ) -> f64 {
     let tolerance = &demonstration.check().search.scales;
-    let ranges = SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance);
+    let ranges = SizeRange::all(demonstration.marks.photo_size, picture_size, tolerance);
     let scale = image_from_cutout.scale;
     let factor = SizeRange::nearest(&ranges, scale).map_or(scale, |range| range.clamp(scale)) / scale;
     let placed = demonstration.outline(image_from_cutout).bounds();
@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn a_demonstration_that_fills_its_box_leaves_the_score_and_one_beside_it_or_of_another_size_lowers_it() {
         let taught = TaughtDemonstration::new(&demonstration()).unwrap();
-        let picture = taught.marks.photo_size.map_or((640, 480), |[width, height]| (width, height));
+        let picture = taught.marks.photo_size.unwrap_or([640, 480]);
         let at = |x: f64, scale: f64| {
             let pivot = taught.marks.bbox.center();
             let moved = pivot + nalgebra::Vector2::new(x, 0.0);

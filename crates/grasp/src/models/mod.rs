@@ -153,7 +153,7 @@ impl Network {
     }
 
     /// [`Self::proposals`], asynchronous, in a region of a picture of size `whole`; the network gets the region's
-    /// pixels at the scale used for the whole picture.
+    /// pixels at the scale used for the whole picture, and the part's possible sizes are those in the whole picture.
     ///
     /// # Errors
     /// As for [`Self::proposals`].
@@ -173,12 +173,12 @@ impl Network {
         let scored = read.into_iter().map(|one| {
             let demonstration = &demonstrations[one.demonstration_idx];
             let pose = one.image_from_cutout;
-            one.in_pose(demonstration, pose, image.dimensions(), None)
+            one.in_pose(demonstration, pose, whole, None)
         });
         let mut candidates: Vec<PoseCandidate> = scored.collect();
         comparison::best_first(&mut candidates, |one| one);
         if let Some(network) = &self.comparison {
-            candidates = Comparer::new(network, image, demonstrations).compare(candidates).await;
+            candidates = Comparer::new(network, image, whole, demonstrations).compare(candidates).await;
         }
         let mut proposals = Proposals::default();
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
@@ -248,4 +248,34 @@ pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
         expected: describe(expected_keypoints, expected_masks, 1),
         found: describe(keypoints, heads.mask_head.is_some(), heads.num_classes),
     })
+}
+
+#[cfg(all(test, feature = "teach"))]
+mod tests {
+    use super::*;
+    use crate::teach::tests::demonstration;
+    use image::imageops::crop_imm;
+    use sdg_detection::presets::edge_of;
+
+    #[test]
+    fn the_possible_sizes_in_a_region_are_those_in_the_whole_picture() {
+        let demonstration = demonstration();
+        let demonstrations = [TaughtDemonstration::new(&demonstration).unwrap()];
+        let detector = edge_of(rcnn_kind(ModelKind::B).unwrap()).init(&Device::flex(), 1).unwrap();
+        let network = Network { detector, reading: Reading::BoxAndKeypoints, comparison: None };
+        let whole: [u32; 2] = demonstration.image.dimensions().into();
+        let region = crop_imm(&demonstration.image, 48, 24, 96, 96).to_image();
+        let proposals = read_sync(network.proposals_async(&region, whole, &demonstrations)).unwrap();
+        let score = |one: &PoseCandidate, picture_size: [u32; 2]| {
+            let filled = consistency::filled(&demonstrations[0], &one.image_from_cutout, &one.bbox, picture_size);
+            consistency::score(one.class_probability, filled, None)
+        };
+        // An untaught network has boxes of many sizes, some of which the part could have only in a picture as small as
+        // the region.
+        let in_region = |one: &PoseCandidate| score(one, region.dimensions().into());
+        assert!(proposals.candidates.iter().any(|one| in_region(one) != score(one, whole)), "{proposals:?}");
+        for one in &proposals.candidates {
+            assert_eq!(one.network_score, score(one, whole), "{one:?}");
+        }
+    }
 }

@@ -37,7 +37,6 @@ const STILL_AGREEMENT: f64 = 0.005;
 #[derive(Debug, Clone)]
 pub(super) struct SizedPart {
     pub(super) demonstration_idx: usize,
-    range: SizeRange,
     working: WorkingSize,
     prepared: Arc<Prepared>,
     pub(super) colors: Colors,
@@ -72,8 +71,6 @@ pub(super) struct Followed {
     pub(super) agreement: f64,
     /// The evidence without a close look.
     pub(super) evidence: Evidence,
-    /// ln of the part's size over the nearest nominal size.
-    pub(super) log_size: f64,
     /// Mean brightness divided by that of the demonstration.
     pub(super) light: f64,
 }
@@ -107,16 +104,11 @@ impl SizedPart {
             .into_iter()
             .min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))?;
         let (working, prepared) = demonstration.prepared(&range, colors).ok()?;
-        Some(Self { demonstration_idx, range, working, prepared, colors })
+        Some(Self { demonstration_idx, working, prepared, colors })
     }
 
     pub(super) fn demonstration<'a>(&self, detector: &'a PartDetector) -> &'a TaughtDemonstration {
         &detector.model().demonstrations()[self.demonstration_idx]
-    }
-
-    /// ln of a scale over the nearest nominal size.
-    pub(super) fn log_size(&self, scale: f64) -> f64 {
-        self.range.log_size(scale)
     }
 
     /// Refines the part near `start`; `None` if the frame is smaller than a pixel of the halved picture. `correction` is the offset of the
@@ -172,7 +164,6 @@ impl SizedPart {
             image_from_cutout,
             agreement,
             evidence,
-            log_size: self.range.log_size(image_from_cutout.scale),
             light: search.brightness(&view.image, &pose),
         })
     }

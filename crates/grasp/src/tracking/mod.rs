@@ -43,7 +43,7 @@ use crate::plan_view::PlanarPose;
 pub enum TrackState {
     /// The part was refined in this frame, and its score is high enough.
     Followed,
-    /// As `Followed`, for the first time since it was lost: this frame only.
+    /// As `Followed`, and the part was lost in the frame before.
     FoundAgain,
     /// The part was not confirmed in this frame; the detection is the last confirmed one.
     Lost,

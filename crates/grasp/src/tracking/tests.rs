@@ -180,6 +180,22 @@ fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
     assert_eq!(was_searched, [true, false, false, false, false, false, false]);
 }
 
+/// A frame may be followed, then searched, and is reported once; what was reported before decides.
+#[test]
+fn a_part_is_found_again_if_it_was_reported_lost() {
+    use TrackState::{Followed, FoundAgain, Lost};
+    let [here, there, elsewhere] = [at(80.0, 90.0, 0.0), at(230.0, 160.0, 90.0), at(240.0, 70.0, 200.0)];
+    let states = |frames: &[Vec<PlanarSimilarity>]| {
+        let answers = run_searching_before_answers(&mut tracker(), Duration::from_millis(100), frames);
+        answers.iter().map(|(was_searched, parts)| (*was_searched, parts[0].state)).collect::<Vec<_>>()
+    };
+    // The lost part is followed where it was, before the new part beside it causes a search.
+    let returns = states(&[vec![here], vec![], vec![here, elsewhere]]);
+    assert_eq!(returns, [(true, Followed), (true, Lost), (true, FoundAgain)]);
+    // The moved part is lost only until the same frame is searched.
+    assert_eq!(states(&[vec![here], vec![there]]), [(true, Followed), (true, Followed)]);
+}
+
 #[test]
 fn a_part_that_lies_still_stays_where_the_search_has_it() {
     let frames = vec![vec![at(100.3, 90.8, 17.0)]; 12];

@@ -58,8 +58,8 @@ struct LastLook {
 #[derive(Debug, Clone)]
 struct Still {
     pose: StillPose,
-    score: f64,
-    evidence: Contributions,
+    /// In pixels of the searched image. The pose of a part under a slanted camera only approximates it.
+    detection: GraspDetection,
 }
 
 /// Whether a part is followed.
@@ -160,17 +160,26 @@ impl Track {
     ) {
         let pose = StillPose { image_from_cutout: placement.image_from_cutout, agreement: f64::NEG_INFINITY };
         let seen = self.part.follow(detector, picture, &pose.image_from_cutout, Effort::Snapped, None, Some(&pose));
-        self.still = seen.zip(detection.evidence).filter(|_| detection.is_accepted()).map(|(seen, evidence)| Still {
-            pose: StillPose { agreement: seen.agreement, ..pose },
-            score: detection.score,
-            evidence,
-        });
+        let seen = seen.filter(|_| detection.is_accepted());
+        let still = |agreement| Still { pose: StillPose { agreement, ..pose }, detection: detection.clone() };
+        self.still = seen.map(|seen| still(seen.agreement));
     }
 
     /// The verdict of the last search, while it is valid.
     pub(super) fn held_verdict(&self, followed: &Followed) -> Option<(f64, Contributions)> {
-        let still = self.still.as_ref().filter(|_| followed.is_held)?;
-        Some((still.score, still.evidence))
+        let found = self.held(followed)?;
+        Some((found.score, found.evidence?))
+    }
+
+    /// `detection` with the outline and the grasp of the last search, while that search is valid.
+    pub(super) fn where_held(&self, followed: &Followed, detection: GraspDetection) -> GraspDetection {
+        let Some(found) = self.held(followed) else { return detection };
+        let GraspDetection { score, evidence, agreement, light, .. } = detection;
+        GraspDetection { score, evidence, agreement, light, ..found.clone() }
+    }
+
+    fn held(&self, followed: &Followed) -> Option<&GraspDetection> {
+        self.still.as_ref().filter(|_| followed.is_held).map(|still| &still.detection)
     }
 
     /// Uses the marks' shift, the network's score and the close look of a search.
@@ -288,9 +297,9 @@ impl Track {
         self.part.demonstration_idx
     }
 
-    /// ln of the part's size over the nearest nominal size, smoothed over frames.
+    /// [`crate::verdict::Clues::log_size`], smoothed over frames.
     pub(super) fn log_size(&self) -> f64 {
-        self.part.log_size(self.steady_scale)
+        self.steady_scale.ln()
     }
 
     /// The first effort of refinement in a frame.
@@ -318,7 +327,6 @@ impl Track {
             colors: self.part.colors,
             agreement: followed.agreement,
             evidence: Evidence { close, ..followed.evidence },
-            log_size: followed.log_size,
             light: followed.light,
         };
         Sighting {

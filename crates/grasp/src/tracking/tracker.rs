@@ -87,6 +87,8 @@ enum Gap {
 struct Tracked {
     track: Track,
     part: TrackedPart,
+    /// Whether the part was lost in the frame before the newest, as returned to the caller.
+    was_lost: bool,
 }
 
 /// The reported data of a track.
@@ -129,6 +131,7 @@ impl Tracker {
         self.next_number += 1;
         let before = self.frames.newest().cloned();
         let boxes_before = self.followed_boxes();
+        self.tracks.iter_mut().for_each(|tracked| tracked.was_lost = !tracked.part.is_followed());
         self.frames.push(BufferedFrame { number, picture: picture.clone(), time: captured });
         self.frames.forget_before(self.oldest_needed());
 
@@ -402,7 +405,7 @@ impl Tracker {
         let output = |track: &Track, refined: &Refined, (score, evidence), size: [u32; 2]| {
             let sighting = track.sighting(&detector, &refined.followed, refined.close);
             let detection = sighting.detection(score, evidence, detector.model().num_keypoints());
-            shown_within(&detector, detection, size)
+            shown_within(&detector, track.where_held(&refined.followed, detection), size)
         };
         let size = self.frames.newest().map_or([0, 0], |newest| detector.frame_size(&newest.picture));
         for ((tracked, refined), verdict) in self.tracks.iter_mut().zip(refined.iter()).zip(verdicts) {
@@ -458,7 +461,7 @@ impl Tracker {
             let age = captured.saturating_sub(track.first_seen);
             let unseen_for = Duration::ZERO;
             let part = TrackedPart { id: track.id, state: TrackState::Followed, age, unseen_for, detection, pose };
-            self.tracks.push(Tracked { track, part });
+            self.tracks.push(Tracked { track, part, was_lost: false });
         }
     }
 
@@ -490,18 +493,15 @@ fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u
 }
 
 impl Tracked {
-    fn follow(
-        &mut self,
-        detector: &PartDetector,
-        followed: &Followed,
-        number: u64,
-        captured: Duration,
-        (detection, pose): Shown,
-    ) {
-        let was_lost = matches!(self.track.standing, Standing::Lost(_));
+    fn follow(&mut self, detector: &PartDetector, followed: &Followed, number: u64, captured: Duration, shown: Shown) {
         self.track.accept(detector, followed, number, captured);
         self.track.standing = Standing::Followed;
-        self.part.state = if was_lost { TrackState::FoundAgain } else { TrackState::Followed };
+        self.show(captured, shown);
+    }
+
+    /// Reports the part where it is followed.
+    fn show(&mut self, captured: Duration, (detection, pose): Shown) {
+        self.part.state = if self.was_lost { TrackState::FoundAgain } else { TrackState::Followed };
         self.part.age = captured.saturating_sub(self.track.first_seen);
         self.part.unseen_for = Duration::ZERO;
         (self.part.detection, self.part.pose) = (detection, pose);
@@ -522,12 +522,8 @@ impl Tracked {
     }
 
     /// Continues from another track's pose of the same part.
-    fn go_on_as(&mut self, other: Track, captured: Duration, (detection, pose): (GraspDetection, Option<PlanarPose>)) {
-        let was_lost = matches!(self.track.standing, Standing::Lost(_));
+    fn go_on_as(&mut self, other: Track, captured: Duration, shown: Shown) {
         self.track.replace_by(other);
-        self.part.state = if was_lost { TrackState::FoundAgain } else { TrackState::Followed };
-        self.part.age = captured.saturating_sub(self.track.first_seen);
-        self.part.unseen_for = Duration::ZERO;
-        (self.part.detection, self.part.pose) = (detection, pose);
+        self.show(captured, shown);
     }
 }

@@ -9,6 +9,8 @@ use std::time::Instant;
 use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use sdg_kinematics::collision::{Checker, CollisionModel};
+use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{CartesianLimits, JointVector, Trajectory, ready_pose};
 use sdg_robot::{
     CameraPose, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, LookOut, PartFinder, PlaceGoal,
@@ -144,14 +146,16 @@ impl Workcell {
     /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
     ///
     /// # Errors
-    /// An error if the arm cannot reach the first look-out pose; the errors of [`Workcell::reset`].
+    /// An error if the arm cannot reach the first look-out pose, or if obstacles block every start; the errors of
+    /// [`Workcell::reset`].
     pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
         let start = self.random_start(config, seed)?;
         self.reset(&start)
     }
 
     /// A random configuration near the ready pose, well above the table, from which the arm reaches the first look-out
-    /// pose without coming near the table; the ready pose itself if no such configuration is found.
+    /// pose without coming near the table; the ready pose itself if no such configuration is found. Among obstacles,
+    /// the start is one from which motions can be planned.
     fn random_start(&self, config: &GraspConfig, seed: u64) -> Result<JointVector> {
         const SPREAD_RAD: [f64; 7] = [0.9, 0.4, 0.5, 0.4, 0.6, 0.4, 0.9];
         const NUM_TRIES: usize = 200;
@@ -159,16 +163,72 @@ impl Workcell {
         let first = config.look_outs.first().copied().unwrap_or(LookOut::Joints(ready_pose()));
         let look = first.configuration(&self.panda, &self.wrist_camera(), 0.0)?;
         let limits = config.pace.free_limits(&self.panda);
+        let model = CollisionModel::new(&self.panda, config.obstacles.clone(), self.panda.hand.opening_max_m)
+            .map_err(|error| SimulationError::Robot(error.to_string()))?;
+        let margin_m = PlanOptions::default().margin_m;
+        let mut checker = Checker::new(&model, margin_m);
+        // Without obstacles nothing is planned, and the starts of stored attempts stay the same.
+        let mut is_free = |q: &JointVector| config.obstacles.is_empty() || checker.is_free(q);
         for _ in 0..NUM_TRIES {
             let offset = JointVector::from_fn(|joint, _| rng.random_range(-SPREAD_RAD[joint]..SPREAD_RAD[joint]));
             let q = self.panda.limits.clamp(&(ready_pose() + offset));
             let safe = self.panda.clearance(&q, 0.0).lowest_m > 0.2
                 && Trajectory::point_to_point(&q, &look, &limits)
                     .is_ok_and(|motion| motion.clearance(&self.panda, 0.0).lowest_m > FREE_CLEARANCE_M);
-            if safe {
+            if safe && is_free(&q) {
                 return Ok(q);
             }
         }
-        Ok(ready_pose())
+        let ready = ready_pose();
+        if !is_free(&ready) {
+            return Err(SimulationError::Configuration {
+                field: "obstacles",
+                expected: format!("{:.0} mm between the arm and everything else at its ready pose", margin_m * 1e3),
+                found: model.nearest(&ready).to_string(),
+            });
+        }
+        Ok(ready)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_kinematics::collision::{Obstacle, Shape};
+
+    use super::*;
+    use crate::scene::SceneVariation;
+    use crate::workcell::WorkcellConfig;
+
+    /// Settings with a box at a position in the base frame.
+    fn beside(name: &str, half_m: [f64; 3], [x, y, z]: [f64; 3]) -> GraspConfig {
+        let (shape, base_from_obstacle) = (Shape::Box { half_m }, Isometry3::translation(x, y, z));
+        let obstacle = Obstacle { name: name.to_owned(), shape, base_from_obstacle };
+        GraspConfig { obstacles: vec![obstacle], ..GraspConfig::default() }
+    }
+
+    #[test]
+    fn starts_are_free_of_obstacles() {
+        let cell = Workcell::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();
+        let config = beside("wall", [1.0, 0.01, 1.0], [0.4, -0.3, 0.5]);
+        let model = CollisionModel::new(&cell.panda, config.obstacles.clone(), cell.panda.hand.opening_max_m).unwrap();
+        let mut checker = Checker::new(&model, PlanOptions::default().margin_m);
+        let mut num_replaced = 0;
+        for seed in 1..=50 {
+            let without = cell.random_start(&GraspConfig::default(), seed).unwrap();
+            let start = cell.random_start(&config, seed).unwrap();
+            assert!(checker.is_free(&start), "seed {seed}: {}", model.nearest(&start));
+            // A start that is free anyway stays the same.
+            assert_eq!(start != without, !checker.is_free(&without), "seed {seed}");
+            num_replaced += usize::from(start != without);
+        }
+        assert!(num_replaced > 0);
+    }
+
+    #[test]
+    fn an_obstacle_at_every_start_is_named() {
+        let cell = Workcell::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();
+        let config = beside("cupboard", [0.5, 0.9, 0.5], [0.4, 0.0, 0.6]);
+        let error = cell.random_start(&config, 1).unwrap_err().to_string();
+        assert!(error.starts_with("obstacles: expected 3 mm ") && error.contains("inside cupboard"), "{error}");
     }
 }

@@ -33,6 +33,9 @@ Labelled pictures (--pictures DIR):
   label_offset {agreeing {count, of}, along_percent, across_percent, px, turn_deg, totals}, if the labels mark another grasp on the part.
   The exit code is 3 if parts are marked and nothing was detected.";
 
+/// Number of pictures of each part with it, and without it.
+pub const DEFAULT_PICTURES: u32 = 25;
+
 /// `sdg evaluate`
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = format!("{PICTURES_HELP}\n\n{SPLIT_HELP}"))]
@@ -94,10 +97,20 @@ pub struct EvaluateArgs {
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub attempts: u32,
     /// Number of unseen pictures of each part, for detection against the ground truth
-    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(
+        long,
+        default_value_t = DEFAULT_PICTURES,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=10_000)
+    )]
     pub views: u32,
     /// Number of pictures without the part for each part, for false alarms
-    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(
+        long,
+        default_value_t = DEFAULT_PICTURES,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=10_000)
+    )]
     pub scenes: u32,
     /// Also run every grasp of models A to D without the check against the demonstration
     #[arg(long)]

@@ -9,7 +9,7 @@ use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use super::args::EvaluateArgs;
+use super::args::{DEFAULT_PICTURES, EvaluateArgs};
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
 use crate::exit::{Outcome, Usage};
@@ -20,6 +20,9 @@ use crate::progress::EvaluationProgress;
 /// Runs the remaining units, then writes the tables of all finished ones; also after Ctrl-C.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let selection = Selection::parse(names).map_err(|error| Usage(format!("--axes: {error}")))?;
+    if args.against.is_some() && selection.axes.is_empty() {
+        return Err(Usage("--against: expected axes of pictures in --axes, found only grasps".into()).into());
+    }
     let models = models(&args.models, &ModelKind::ALL)?;
     let objects = objects(&args.objects, ObjectSpec::names())?;
     let (preset, settings) = settings(args)?;
@@ -65,7 +68,13 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match (failures.first(), remaining) {
-        (None, 0) => Ok(Outcome::Done),
+        (None, 0) => match other.filter(|_| comparisons.is_empty()) {
+            Some(other) => bail!(
+                "--against {}: expected results of these models on pictures of these parts and axes, found none",
+                other.display()
+            ),
+            None => Ok(Outcome::Done),
+        },
         (None, _) => bail!("interrupted with {remaining} units of work left: run the same command again to continue"),
         (Some(first), _) => bail!(
             "{} units of work failed, {remaining} are left: run the same command again to retry; the first error: {first}",
@@ -92,6 +101,12 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
     }
     option("axis-views", &args.axis_views);
     option("attempts", &args.attempts);
+    // Attempts without an error are shared with the paper's protocol: they are stored with all of its settings.
+    for (name, number) in [("views", args.views), ("scenes", args.scenes)] {
+        if number != DEFAULT_PICTURES {
+            option(name, &number);
+        }
+    }
     if let Some(points) = args.search_points {
         option("search-points", &points);
     }
@@ -107,4 +122,25 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
     }
     option("seed", &args.seed);
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Args, Command};
+    use clap::Parser;
+
+    #[test]
+    fn the_command_of_the_page_has_the_settings_of_its_records() {
+        let repeated = |line: &str| {
+            let Command::Evaluate(args) = Args::try_parse_from(line.split(' ')).unwrap().command else {
+                panic!("another command")
+            };
+            command(&args, args.axes.as_deref().unwrap())
+        };
+        let line =
+            "sdg evaluate --axes no-error --axis-views 2 --attempts 3 --views 4 --scenes 5 --preset edge --seed 1";
+        assert_eq!(repeated(line), line);
+        assert!(!repeated("sdg evaluate --axes").contains("--views"));
+    }
 }

@@ -67,11 +67,16 @@ fn sets(names: &[String]) -> Result<Vec<PictureSet>> {
         return Ok(all);
     }
     let known = || all.iter().map(|set| set.name()).collect::<Vec<_>>().join(", ");
-    let of = |name: &String| {
+    let mut sets = Vec::new();
+    for name in names {
         let found = all.iter().copied().find(|set| set.name() == name);
-        found.ok_or_else(|| Usage(format!("--cameras: expected a set out of {}, found {name}", known())).into())
-    };
-    names.iter().map(of).collect()
+        let set = found.ok_or_else(|| Usage(format!("--cameras: expected a set out of {}, found {name}", known())))?;
+        if sets.contains(&set) {
+            return Err(Usage(format!("--cameras: expected each set once, found {name} again")).into());
+        }
+        sets.push(set);
+    }
+    Ok(sets)
 }
 
 /// The command that reproduces the results.

@@ -10,9 +10,9 @@ use anyhow::{Context, Result, anyhow, bail};
 use sdg_evaluation::Progress;
 use sdg_evaluation::sharing::{
     Collecting, Ended, ListedUnit, SlurmJob, UnitFolder, UnitKind, UnitList, Watch, all_units, cores, faults,
-    near_names, own_sha256, submit_script,
+    near_names, own_sha256, submit_script, submitted_jobs,
 };
-use sdg_evaluation::{Evaluation, Settings, Store};
+use sdg_evaluation::{Evaluation, Settings, Store, quoted};
 use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -234,20 +234,27 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     }
     sdg_files::prepare_folder(&folder)?;
     UnitList::new(&units).save(&folder)?;
-    let mut bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).spawn().context("bash: cannot run")?;
+    let mut bash = Command::new("bash");
+    bash.arg("-s").stdin(Stdio::piped()).stdout(if args.json { Stdio::piped() } else { Stdio::inherit() });
+    let mut bash = bash.spawn().context("bash: cannot run")?;
     bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;
-    let status = bash.wait()?;
-    if !status.success() {
+    let output = bash.wait_with_output()?;
+    let printed = String::from_utf8_lossy(&output.stdout);
+    if !output.status.success() {
+        // The jobs that were submitted before the error.
+        eprint!("{printed}");
         bail!(
-            "the script that hands units to Slurm ended with {status}: check that sbatch is installed and Slurm is \
-               running"
+            "the script that hands units to Slurm ended with {}: check that sbatch is installed and Slurm is running",
+            output.status
         );
     }
-    println!(
-        "then: sdg evaluate --watch {}; {} --out {} --collect",
-        folder.display(),
-        command.join(" "),
-        folder.display()
-    );
+    if args.json {
+        let jobs = submitted_jobs(&printed);
+        println!("{}", json!({ "jobs": jobs, "units": units.len(), "out": folder.display().to_string() }));
+        return Ok(Outcome::Done);
+    }
+    let out = quoted(&folder.display().to_string());
+    let command: Vec<String> = command.iter().map(|word| quoted(word)).collect();
+    println!("then: sdg evaluate --watch {out}; {} --out {out} --collect", command.join(" "));
     Ok(Outcome::Done)
 }

@@ -120,6 +120,11 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
              mm long"
         ))
         .into(),
+        Some(OwnPartError::HeightIsKnown { known_mm }) => Usage(format!(
+            "--height-mm: expected a model taught without --camera, found {model_file}, whose marks are {known_mm:.1} \
+             mm above the table"
+        ))
+        .into(),
         _ => error,
     })
 }
@@ -127,7 +132,7 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
 /// A place in the workcell file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
-    robots::check_table_height(&workcell, path)?;
+    robots::check_simulated(&workcell, path)?;
     Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 

@@ -23,7 +23,7 @@ const PICTURE_DEPTH: usize = 10;
 ///
 /// # Errors
 /// A file cannot be used; a table height is given without a base frame; a model without lengths is given or is to be
-/// taught, although the camera's pose is known.
+/// taught, although the node needs lengths.
 pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
     check_trigger(args)?;
     let device = devices::open(&args.compute)?;
@@ -51,8 +51,8 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
         (None, Some(path)) => CameraPoseSource::File(CameraFile::read(path)?.over_table),
         (None, None) => CameraPoseSource::Unknown,
     };
-    if let (Some(model), false, Some(path)) =
-        (&model, matches!(camera_pose, CameraPoseSource::Unknown), args.grasp_model.as_ref())
+    if let (Some(model), Some(path)) = (&model, &args.grasp_model)
+        && needs_lengths(args)
         && model.facts().lengths.is_none()
     {
         return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
@@ -72,10 +72,15 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     })
 }
 
+/// Whether the node uses only models with lengths: for poses of detections, or for grasps by the arm, also with a camera
+/// on the hand, whose pictures have no poses.
+fn needs_lengths(args: &Ros2Args) -> bool {
+    args.camera.is_some() || args.base_frame.is_some() || args.arm.allow_motion
+}
+
 /// Checks that `~/teach_trigger` teaches a model with lengths if the node needs them.
 fn check_trigger(args: &Ros2Args) -> Result<(), Usage> {
-    let needs_lengths = args.camera.is_some() || args.base_frame.is_some() || args.arm.allow_motion;
-    if args.teach.teach_demo.is_some() && needs_lengths && args.teach.teach_mark_height_mm.is_none() {
+    if args.teach.teach_demo.is_some() && needs_lengths(args) && args.teach.teach_mark_height_mm.is_none() {
         let why = "a node with --camera, --base-frame or --allow-motion uses only models with lengths";
         return Err(Usage(format!("--teach-demo: expected --camera and --teach-mark-height-mm, because {why}")));
     }
@@ -106,8 +111,11 @@ fn arm_base_frame(args: &Ros2Args) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use clap::Parser;
+    use sdg_ros2_node::TeachJob;
 
     #[derive(Debug, Parser)]
     struct Line {
@@ -141,5 +149,34 @@ mod tests {
             check_trigger(&parsed(&line).unwrap()).unwrap();
         }
         assert!(parsed(&format!("{teach} --teach-mark-height-mm 16")).is_err(), "the height needs a camera");
+    }
+
+    #[test]
+    fn a_node_with_a_camera_on_the_hand_rejects_a_model_without_lengths() {
+        let folder = tempfile::tempdir().unwrap();
+        let shipped = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name);
+        let job = TeachJob {
+            photo: shipped("demonstrations/pendulum/image.png").display().to_string(),
+            marks: Some(shipped("demonstrations/pendulum/annotation.json")),
+            out: folder.path().join("part.sdg"),
+            model: "S".to_owned(),
+            seed: TeachJob::DEFAULT_SEED,
+            time_budget: None,
+            mark_height_mm: None,
+            is_used: true,
+        };
+        let with_model = |line: &str| Ros2Args { grasp_model: Some(job.out.clone()), ..parsed(line).unwrap() };
+        let (without_poses, interrupt) = (with_model("ros2"), Interrupt::default());
+        teach(&job, &devices::open(&without_poses.compute).unwrap(), None, &interrupt).unwrap();
+        assert!(node_settings(&without_poses, &interrupt).is_ok());
+
+        // A camera on the hand has no fixed pose above the table.
+        let camera = std::fs::read_to_string(shipped("workcell/camera.yaml")).unwrap();
+        let on_hand = folder.path().join("camera.yaml");
+        std::fs::write(&on_hand, camera.split("\ntable:").next().unwrap()).unwrap();
+        let grasping = with_model("ros2 --allow-motion --workcell cell.toml --camera camera.yaml");
+        let grasping = Ros2Args { camera: Some(on_hand), ..grasping };
+        let error = node_settings(&grasping, &interrupt).err().unwrap();
+        assert!(matches!(error.downcast_ref(), Some(GraspError::NoLengths)), "{error:#}");
     }
 }

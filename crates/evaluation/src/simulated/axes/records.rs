@@ -95,6 +95,29 @@ pub struct AxisRecord {
 pub type Case = (u64, usize);
 
 impl AxisPicture {
+    /// A picture with one instance, which was found or for which another place was accepted.
+    #[cfg(test)]
+    pub(super) fn for_test(number: u64, found: bool) -> Self {
+        let detection = PlacedDetection {
+            score: 0.9,
+            network_score: 0.9,
+            agreement: None,
+            error_mm: Some(if found { 1.0 } else { 30.0 }),
+            error_deg: Some(1.0),
+            found: found.then_some(0),
+        };
+        let answer = Answer { detections: vec![detection] };
+        Self {
+            number,
+            parameter: 1.0,
+            unit: "degrees".into(),
+            visible: vec![1.0],
+            look_alike: None,
+            verified: answer.clone(),
+            alone: Some(answer),
+        }
+    }
+
     /// The detections of one way.
     fn answer(&self, way: Way) -> Option<&Answer> {
         match way {

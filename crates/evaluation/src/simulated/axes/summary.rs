@@ -269,7 +269,6 @@ fn axis_figures(
     let answers: Vec<&Answer> =
         records.iter().filter_map(|(_, record)| record.as_ref()).flat_map(|record| record.answers(way)).collect();
     let accepted = || answers.iter().flat_map(|answer| &answer.detections).filter(|detection| detection.is_accepted());
-    let shown = || records.iter().filter_map(|(_, record)| record.as_ref());
     AxisFigures {
         axis: axis.name(),
         model,
@@ -280,17 +279,22 @@ fn axis_figures(
         pictures: records.iter().map(|(_, record)| record.as_ref().map_or(axis_views, |r| r.pictures.len())).sum(),
         distance_mm: spread(&accepted().filter_map(|detection| detection.error_mm).collect::<Vec<_>>()),
         turn_deg: spread(&accepted().filter_map(|detection| detection.error_deg).collect::<Vec<_>>()),
-        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, shown())),
+        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, records, axis_views)),
         parts,
     }
 }
 
-/// A third of the pictures, over all parts.
-fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item = &'r AxisRecord>) -> Third {
+/// A third of the pictures, over all parts. Without a model, every instance counts as missed.
+fn of_third(third: usize, axis: Axis, way: Way, records: &[(&str, Option<AxisRecord>)], axis_views: usize) -> Third {
     let mut sum = Third::default();
-    for record in records {
-        let count = record.pictures.len();
+    for (_, record) in records {
+        let count = record.as_ref().map_or(axis_views, |record| record.pictures.len());
         let is_in_third = |number: u64| number as usize * 3 / count.max(1) == third;
+        let Some(record) = record else {
+            let num_pictures = (0..axis_views as u64).filter(|number| is_in_third(*number)).count();
+            sum.found = sum.found + Share { count: 0, of: num_pictures * instances_in_picture(axis) };
+            continue;
+        };
         let outcomes = record.outcomes(axis, way).into_iter().filter(|((number, _), _)| is_in_third(*number));
         sum.found = sum.found + Share::of(outcomes, |(_, is_right)| *is_right);
         for picture in record.pictures.iter().filter(|picture| is_in_third(picture.number)) {

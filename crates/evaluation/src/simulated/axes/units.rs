@@ -215,27 +215,6 @@ mod tests {
         evaluation.tasks().unwrap().iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect()
     }
 
-    fn picture(number: u64, found: bool) -> AxisPicture {
-        let detection = super::super::records::PlacedDetection {
-            score: 0.9,
-            network_score: 0.9,
-            agreement: None,
-            error_mm: Some(if found { 1.0 } else { 30.0 }),
-            error_deg: Some(1.0),
-            found: found.then_some(0),
-        };
-        let answer = super::super::records::Answer { detections: vec![detection] };
-        AxisPicture {
-            number,
-            parameter: 1.0,
-            unit: "degrees".into(),
-            visible: vec![1.0],
-            look_alike: None,
-            verified: answer.clone(),
-            alone: Some(answer),
-        }
-    }
-
     #[test]
     fn teachings_are_shared_and_what_is_there_is_not_done_again() {
         let folder = tempfile::tempdir().unwrap();
@@ -278,7 +257,7 @@ mod tests {
             store.write_made_with(file, &store.settings().teaching(), &failed).unwrap();
         }
         for (model, found) in [(ModelKind::B, [true, false]), (ModelKind::C, [true, true])] {
-            let pictures = (0..2).map(|number| picture(number, found[number as usize])).collect();
+            let pictures = (0..2).map(|number| AxisPicture::for_test(number, found[number as usize])).collect();
             let record = AxisRecord { pictures, seconds: 2.0 };
             let file = axis_file(Cell { model, object: "pendulum" }, Axis::Tilt);
             store.write_made_with(&file, &evaluation.axis_settings(), &record).unwrap();
@@ -305,6 +284,7 @@ mod tests {
         assert_eq!(found(paper, ModelKind::C), (Share { count: 2, of: 2 }, 0));
         // Without a model, every part counts as missed and every attempt as failed.
         assert_eq!(found(held_out, ModelKind::C), (Share { count: 0, of: 2 }, 0));
+        assert_eq!(held_out.axes[0].thirds.map(|third| third.found.of), [1, 1, 0]);
         assert_eq!(held_out.grasps[1].failures_by_step[AttemptRecord::TEACH], 2);
         assert_eq!(paper.grasps[0].held, Share { count: 0, of: 2 });
     }

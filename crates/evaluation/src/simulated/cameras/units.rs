@@ -54,16 +54,7 @@ struct CameraSettings {
     #[serde(flatten)]
     teaching: TeachingSettings,
     views: u32,
-    #[serde(default = "one", skip_serializing_if = "is_one")]
     photos: u32,
-}
-
-fn one() -> u32 {
-    1
-}
-
-fn is_one(photos: &u32) -> bool {
-    *photos == 1
 }
 
 impl CamerasEvaluation<'_> {
@@ -86,7 +77,8 @@ impl CamerasEvaluation<'_> {
 
     /// A model's stored detections in a part's pictures of a set.
     pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
-        self.store.read_made_with(&file(cell, set), &self.settings())
+        // Earlier versions did not write the number of photos if it was one.
+        self.store.read_made_with_defaults(&file(cell, set), &self.settings(), &[("photos", 1.into())])
     }
 
     /// Whether teaching for a cell gave no model.
@@ -112,6 +104,8 @@ impl CamerasEvaluation<'_> {
     fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let mut tasks = Vec::new();
         for object in self.objects {
+            // Networks to teach, each with the index of its task: models may use the same network.
+            let mut teachings: Vec<(ModelKind, usize)> = Vec::new();
             for &model in self.models {
                 let cell = Cell { model, object: &object.name };
                 if self.is_without_model(cell)? {
@@ -123,8 +117,13 @@ impl CamerasEvaluation<'_> {
                         continue;
                     }
                     if after.is_empty() && cell.teaching_from(self.marks(), self.store)?.is_none() {
-                        after.push(tasks.len());
-                        tasks.push(Task { unit: Unit::Teach(cell.network()), after: Vec::new() });
+                        let network = cell.network();
+                        let known = teachings.iter().find(|(model, _)| *model == network.model);
+                        after.push(known.map(|(_, task)| *task).unwrap_or_else(|| {
+                            teachings.push((network.model, tasks.len()));
+                            tasks.push(Task { unit: Unit::Teach(network), after: Vec::new() });
+                            tasks.len() - 1
+                        }));
                     }
                     tasks.push(Task { unit: Unit::Pictures(cell, object, set), after: after.clone() });
                 }
@@ -218,5 +217,57 @@ impl std::fmt::Display for Unit<'_> {
             Self::Teach(cell) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
             Self::Pictures(cell, _, set) => write!(f, "{} {} {}", cell.model, set.name(), cell.object),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Settings;
+
+    fn evaluation<'a>(models: &'a [ModelKind], objects: &'a [ObjectSpec], store: &'a Store) -> CamerasEvaluation<'a> {
+        let sets = &[PictureSet::Camera(0)];
+        CamerasEvaluation { models, objects, sets, preset: Preset::Edge, store, views: 2, photos: 1, jobs: 2 }
+    }
+
+    #[test]
+    fn figures_of_several_photos_are_not_those_of_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
+        let of = |photos| CamerasEvaluation { photos, ..evaluation(&[], &[], &store) };
+        let (cell, set) = (Cell { model: ModelKind::S, object: "pendulum" }, PictureSet::Camera(0));
+        let refused = |photos| of(photos).record(cell, set).unwrap_err().to_string();
+        let record = CameraRecord { pictures: Vec::new(), seconds: 0.0 };
+        store.write_made_with(&file(cell, set), &of(2).settings(), &record).unwrap();
+        assert_eq!(of(2).record(cell, set).unwrap().as_ref(), Some(&record));
+        assert!(refused(1).contains("made with other settings (photos: expected 1, found 2)"), "{}", refused(1));
+
+        // A record of one photo by a version that did not write the number.
+        let mut settings = serde_json::to_value(of(1).settings()).unwrap();
+        settings.as_object_mut().unwrap().remove("photos").unwrap();
+        store.write_made_with(&file(cell, set), &settings, &record).unwrap();
+        assert_eq!(of(1).record(cell, set).unwrap(), Some(record));
+        assert!(refused(2).contains("photos: expected 2, found 1"), "{}", refused(2));
+    }
+
+    #[test]
+    fn models_with_the_same_network_are_taught_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
+        let objects = ["pendulum", "key"].map(|name| ObjectSpec::by_name(name).unwrap());
+        let evaluation = evaluation(&[ModelKind::B, ModelKind::C], &objects, &store);
+        let tasks: Vec<String> =
+            evaluation.tasks().unwrap().iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect();
+        assert_eq!(
+            tasks,
+            [
+                "teach C pendulum in the plan view []",
+                "B webcam pendulum [0]",
+                "C webcam pendulum [0]",
+                "teach C key in the plan view []",
+                "B webcam key [3]",
+                "C webcam key [3]"
+            ]
+        );
     }
 }

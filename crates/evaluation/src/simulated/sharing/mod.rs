@@ -32,7 +32,7 @@ pub use checking::{Collecting, faults};
 pub use doing::Ended;
 pub use near_names::near_names;
 pub use records::{Failure, Receipt, Running};
-pub use slurm::{SlurmJob, cores, submit_script};
+pub use slurm::{SlurmJob, cores, submit_script, submitted_jobs};
 pub use unit_folder::UnitFolder;
 pub use unit_list::{ListedUnit, UnitKind, UnitList, all_units};
 pub use watching::{Progress, Watch};

@@ -98,6 +98,11 @@ fn script_of_submission(job: &SlurmJob, units: &[ListedUnit], marker: &str) -> S
     script
 }
 
+/// The number of each submitted array in what the script printed.
+pub fn submitted_jobs(printed: &str) -> Vec<&str> {
+    printed.lines().filter_map(|line| line.split_once(": job ")?.1.split_once(", ")).map(|(job, _)| job).collect()
+}
+
 /// The number of cores that Slurm allocated, or else the machine's.
 pub fn cores() -> usize {
     let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());

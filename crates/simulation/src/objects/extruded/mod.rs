@@ -54,7 +54,7 @@ pub struct Extrusion<'a> {
     pub jaw_width_px: f64,
     /// Size of a pixel, in metres.
     pub metres_per_pixel: f64,
-    /// Height above the table, in metres: from 0.003 to 0.12.
+    /// Height above the table, in metres, within [`Self::HEIGHTS_M`].
     pub height_m: f64,
     /// Mass in kilograms.
     pub mass_kg: f64,
@@ -65,6 +65,9 @@ pub struct Extrusion<'a> {
 }
 
 impl Extrusion<'_> {
+    /// Smallest and largest height of a body above the table, in metres.
+    pub const HEIGHTS_M: [f64; 2] = [0.003, 0.12];
+
     /// The volume of the body, in cubic metres.
     pub fn volume_m3(&self) -> f64 {
         self.outline.area() * self.metres_per_pixel.powi(2) * self.height_m
@@ -73,8 +76,9 @@ impl Extrusion<'_> {
     /// Checks that a simulated hand and table can handle the part; the error states the name of the value, the expected
     /// range and the found value.
     fn check(&self) -> std::result::Result<(), String> {
+        let [min_m, max_m] = Self::HEIGHTS_M;
         let ranges = [
-            ("height in m", self.height_m, 0.003, 0.12),
+            ("height in m", self.height_m, min_m, max_m),
             ("mass in kg", self.mass_kg, 1e-4, 3.0),
             ("friction", self.friction, 0.01, 5.0),
             ("opening of the jaws in m", self.jaw_width_px * self.metres_per_pixel, 1e-3, LARGEST_JAW_WIDTH_M),
