@@ -173,6 +173,23 @@ def test_a_region_is_searched_alone(shape_model: sdg.GraspModel) -> None:
     assert left.best.grasp.x < 320 and left.best.grasp.y < 240
 
 
+def test_a_region_replaces_that_of_the_model_with_a_camera_of_other_pictures() -> None:
+    model = sdg.teach(
+        made_pictures.PHOTO,
+        made_pictures.MARKS,
+        model="S",
+        region=(220, 140, 200, 200),
+        camera=made_pictures.CAMERA,
+        mark_height_mm=MARK_HEIGHT_MM,
+    )
+    text = made_pictures.CAMERA.read_text()
+    camera = sdg.Camera.from_yaml(text.replace("width: 640", "width: 600").replace("height: 480", "height: 450"))
+    cut = np.ascontiguousarray(sdg.read_picture(made_pictures.PHOTO)[:450, :600])
+    with pytest.raises(sdg.RegionError, match="640 × 480"):
+        model.detect(cut, camera=camera)
+    assert len(model.detect(cut, camera=camera, region="all")) == 1
+
+
 def test_a_tracker_follows_the_part(shape_model: sdg.GraspModel) -> None:
     photo = sdg.read_picture(made_pictures.PHOTO)
     with sdg.Tracker(shape_model, search_frames=1) as tracker:

@@ -127,7 +127,7 @@ impl Model {
             let found = perception.detect(picture, Verification::ByShape)?;
             let size = picture.dimensions().into();
             let detections: Vec<_> = found.iter().map(|found| &found.detection).collect();
-            let touched = perception.touched_among_accepted(&detections, min_score);
+            let touched = perception.touched_among_accepted(&detections, |idx| detections[idx].score >= min_score);
             let record = |(found, jaws_touch): (&Found, Vec<usize>)| Record {
                 found: FoundRecord::new(found, &perception),
                 size: perception.size_of(&found.detection, size),
@@ -147,7 +147,11 @@ impl Model {
         if let Some(last) = last().as_ref().filter(|last| last.is_for(camera, region)) {
             return Ok(Arc::clone(&last.perception));
         }
-        let model = GraspModel::clone(&self.model);
+        let mut model = GraspModel::clone(&self.model);
+        if region != RegionChoice::OfModel {
+            // The model's region, which is replaced, may not fit this camera's pictures.
+            model = model.with_region(None)?;
+        }
         let mut perception = match camera {
             Some(camera) => Perception::calibrated(model, camera.calibrated())?,
             None => Perception::of_any_camera(model),

@@ -191,8 +191,11 @@ impl CalibratedCamera {
     /// and with equal intrinsics also the matrices of rectification and projection.
     ///
     /// # Errors
-    /// [`CameraFileError::NotUpdatable`] if the file does not have ROS's layout.
+    /// The errors of [`Self::from_yaml`] if this camera is impossible; [`CameraFileError::NotUpdatable`] if the file
+    /// does not have ROS's layout.
     pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
+        // An impossible value is no fault of the existing file.
+        Self::from_yaml(&self.to_yaml())?;
         let is_recalibrated = !Self::from_yaml(existing).is_ok_and(|old| old.intrinsics == self.intrinsics);
         let is_ours = |name: &str| is_recalibrated || !OF_RECTIFICATION.contains(&name);
         let known: Vec<&str> = SECTIONS.into_iter().filter(|&name| is_ours(name)).collect();
@@ -504,6 +507,9 @@ table:
         assert!(updated.starts_with("# bought 2019\n") && updated.contains("serial_number: 17  # on the back\n"));
         assert_eq!(read(&updated).unwrap(), camera);
         assert_eq!(camera.update_yaml("{a: 1}"), Err(CameraFileError::NotUpdatable));
+        let mut below = read(&existing).unwrap();
+        below.table.as_mut().unwrap().height_m = 5.0;
+        assert!(matches!(below.update_yaml(&existing), Err(CameraFileError::Height { .. })));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Plans a grasp from the arm's current posture, with the real sequence and limits, without moving the arm.
 
 use sdg_robot::{
-    Arm, ArmState, CameraPose, GraspConfig, GraspStep, GraspTarget, HandCommand, HandState, KnownTarget, PlaceGoal,
-    PlacingConfig, PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
+    Arm, ArmState, CameraPose, GraspConfig, GraspStep, HandCommand, HandState, KnownTarget, PlaceGoal, PlacingConfig,
+    PlannedAction, PlannedArm, Result, Robot, SafetyLimits, Watch,
 };
 
 use crate::sequence_run::run_sequence;
@@ -23,7 +23,7 @@ pub struct DryRun {
 }
 
 impl DryRun {
-    /// Plans the sequence from a state of arm and hand. `target` is the part's pose, if the part is visible there.
+    /// Plans the sequence from a state of arm and hand. `seen` has the part, if it is visible there, and the others.
     ///
     /// # Errors
     /// A setting of the sequence is invalid, or the place has no room for the part. A motion that violates a limit is
@@ -31,7 +31,7 @@ impl DryRun {
     pub fn plan(
         start: ArmState,
         hand: HandState,
-        target: Option<GraspTarget>,
+        mut seen: KnownTarget,
         limits: SafetyLimits,
         camera: CameraPose,
         config: &GraspConfig,
@@ -40,8 +40,7 @@ impl DryRun {
         let opening_m = hand.opening_m;
         let mut arm = PlannedArm::new(limits.geometry.clone(), start.q_commanded, opening_m).with_hand(hand);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
-        let mut finder = KnownTarget::new(target, camera, config);
-        let ended = run_sequence(&mut robot, &mut finder, camera, config, place)?;
+        let ended = run_sequence(&mut robot, &mut seen, camera, config, place)?;
         let found_nothing = ended.found_nothing();
         Ok(Self { start, opening_m, arm, failed: ended.failed, found_nothing })
     }
@@ -68,5 +67,45 @@ impl DryRun {
             }
         };
         self.arm.actions().iter().filter_map(in_words).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Point2};
+    use sdg_kinematics::{JointVector, ready_pose};
+    use sdg_robot::{ArmMode, GraspTarget, LookOut, PartShape, Place, PlaceKind};
+
+    use super::*;
+
+    #[test]
+    fn a_part_that_lies_in_the_goal_is_told_by_the_plan() {
+        let (q, zero) = (ready_pose(), JointVector::zeros());
+        let start =
+            ArmState { time_secs: 0.0, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Idle };
+        let hand = HandState { opening_m: 0.08, is_grasping: false, force_n: None };
+        let corners = [[-0.03, -0.01], [0.03, -0.01], [0.03, 0.01], [-0.03, 0.01]].map(Point2::from);
+        let bar = PartShape::new(corners, 0.020, 0.030, 0.020).unwrap();
+        let config = GraspConfig { look_outs: vec![LookOut::Joints(q)], part: Some(bar), ..GraspConfig::default() };
+        let camera = CameraPose::InBase(Isometry3::identity());
+        let goal_at = |at_m: [f64; 2], yaw_rad: f64| {
+            let place = Place { name: "rack".to_owned(), at_m, yaw_rad, surface_m: 0.0, kind: PlaceKind::Pose };
+            place.goal(1).unwrap()
+        };
+        let lying = |goal: &PlaceGoal| GraspTarget {
+            base_from_tcp: goal.base_from_part(0.020, 0.0),
+            jaw_width_m: 0.02,
+            score: 0.9,
+        };
+        let (target, goal) = (lying(&goal_at([0.5, 0.1], 0.4)), goal_at([0.4, -0.3], 1.0));
+        let planned = |others: Vec<GraspTarget>| {
+            let seen = KnownTarget::new(Some(target), camera, &config).with_others(others);
+            let place = (goal.clone(), PlacingConfig::default());
+            DryRun::plan(start, hand, seen, SafetyLimits::default(), camera, &config, Some(&place)).unwrap().failed
+        };
+        assert_eq!(planned(Vec::new()), None);
+        let (step, why) = planned(vec![lying(&goal)]).unwrap();
+        assert_eq!(step, GraspStep::Detect);
+        assert!(why.contains("\"rack\" already contains a part, at (0.400, -0.300) m"), "{why}");
     }
 }

@@ -93,7 +93,7 @@ pub struct ModelFinder<P> {
     verification: Verification,
     /// The last picture for a grasp and its detections, best first.
     last: Option<(RgbImage, Vec<Found>)>,
-    /// The best part of the last picture.
+    /// The part that the last search chose.
     seen: Option<SeenOutline>,
     /// The other accepted parts of the last picture.
     others: Vec<GraspTarget>,
@@ -171,7 +171,7 @@ impl<P> ModelFinder<P> {
         self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
 
-    /// The position of the best part in the last picture.
+    /// The position of the part that the last search returned; `None` if its outline is unknown.
     pub fn seen(&self) -> Option<&SeenOutline> {
         self.seen.as_ref()
     }
@@ -212,51 +212,62 @@ impl<P> ModelFinder<P> {
             let p = target.base_from_tcp.translation;
             self.places.iter().any(|place| place.covers([p.x, p.y]))
         };
-        let best = found.iter().copied().find(|target| !is_placed(target));
-        self.keep_others(found, best.as_ref());
-        Ok(best)
+        let best = found.iter().position(|(target, _)| !is_placed(target));
+        Ok(self.choose(found, best))
     }
 
-    /// All parts in a picture, best first. Assumes that they lie `higher_m` above the table, or at one of `heights_m`
-    /// above the table if these are given.
+    /// Keeps the outline of the chosen part, and the other accepted parts. Returns the chosen one.
+    fn choose(
+        &mut self,
+        mut found: Vec<(GraspTarget, Option<SeenOutline>)>,
+        chosen: Option<usize>,
+    ) -> Option<GraspTarget> {
+        let (target, seen) = chosen.map(|idx| found.remove(idx)).unzip();
+        self.seen = seen.flatten();
+        self.others = found.into_iter().map(|(other, _)| other).collect();
+        self.others.retain(|other| other.score >= sdg_robot::SURE);
+        target
+    }
+
+    /// All parts in a picture with their outlines, best first. Assumes that they lie `higher_m` above the table, or at
+    /// one of `heights_m` above the table if these are given.
     fn find_all<A: Arm>(
         &mut self,
         arm: &mut A,
         higher_m: f64,
         heights_m: Option<&RangeInclusive<f64>>,
-    ) -> sdg_robot::Result<Vec<GraspTarget>>
+    ) -> sdg_robot::Result<Vec<(GraspTarget, Option<SeenOutline>)>>
     where
         P: Pictures<A>,
     {
         self.sights.clear();
-        let sightings = self.look(arm, higher_m, heights_m)?;
+        let seen = self.look(arm, higher_m, heights_m)?;
         if heights_m.is_none() {
-            return Ok(sightings.iter().map(|sighting| sighting.target).collect());
+            return Ok(seen.into_iter().map(|(sighting, outline)| (sighting.target, outline)).collect());
         }
-        let at_its_height = |sighting: &Sighting| {
+        let at_its_height = |(sighting, mut outline): (Sighting, Option<SeenOutline>)| {
             let height_m = sighting.height_by_size_m().unwrap_or(sighting.middle_m.z);
-            sighting.at_height(height_m).target
+            let target = sighting.at_height(height_m).target;
+            if let Some(outline) = &mut outline {
+                let higher_m = target.base_from_tcp.translation.z - sighting.target.base_from_tcp.translation.z;
+                let share = 1.0 - higher_m / sighting.distance_m();
+                let foot = sighting.camera_m.xy();
+                outline.outline_in_base.iter_mut().for_each(|corner| *corner = foot + (*corner - foot) * share);
+                outline.z_m.iter_mut().for_each(|z_m| *z_m += higher_m);
+            }
+            (target, outline)
         };
-        let targets: Vec<GraspTarget> = sightings.iter().map(at_its_height).collect();
-        // Moves the outline to the height of the best part.
-        if let (Some(seen), Some(sighting), Some(target)) = (&mut self.seen, sightings.first(), targets.first()) {
-            let higher_m = target.base_from_tcp.translation.z - sighting.target.base_from_tcp.translation.z;
-            let share = 1.0 - higher_m / sighting.distance_m();
-            let foot = sighting.camera_m.xy();
-            seen.outline_in_base.iter_mut().for_each(|corner| *corner = foot + (*corner - foot) * share);
-            seen.z_m.iter_mut().for_each(|z_m| *z_m += higher_m);
-        }
-        Ok(targets)
+        Ok(seen.into_iter().map(at_its_height).collect())
     }
 
-    /// Takes a picture and finds all parts in it, best first. Assumes that they lie `higher_m` above the table; if
-    /// `heights_m` is given, also finds parts at these heights above the table.
+    /// Takes a picture and finds all parts in it with their outlines, best first. Assumes that they lie `higher_m` above
+    /// the table; if `heights_m` is given, also finds parts at these heights above the table.
     fn look<A: Arm>(
         &mut self,
         arm: &mut A,
         higher_m: f64,
         heights_m: Option<&RangeInclusive<f64>>,
-    ) -> sdg_robot::Result<Vec<Sighting>>
+    ) -> sdg_robot::Result<Vec<(Sighting, Option<SeenOutline>)>>
     where
         P: Pictures<A>,
     {
@@ -276,10 +287,12 @@ impl<P> ModelFinder<P> {
             (low * (1.0 - SIZE_LEEWAY)).clamp(0.5, 1.0)..=(high * (1.0 + SIZE_LEEWAY)).clamp(1.0, 2.0)
         }))?;
         let found = self.perception.detect(&picture, self.verification)?;
-        self.seen = found.first().and_then(|best| self.outline_of(best, &camera_over_table));
-        let sightings = found.iter().filter_map(|found| self.sighting(found, &camera_over_table)).collect();
+        let outlined = |found: &Found| {
+            Some((self.sighting(found, &camera_over_table)?, self.outline_of(found, &camera_over_table)))
+        };
+        let seen = found.iter().filter_map(outlined).collect();
         self.last = Some((picture, found));
-        Ok(sightings)
+        Ok(seen)
     }
 
     /// The lengths of the model.
@@ -379,11 +392,6 @@ impl<P> ModelFinder<P> {
         let found = surface_height([first, second], &part)?;
         Some(MeasuredHeight { height_m: found.height_m, sigma_m: found.sigma_m })
     }
-
-    fn keep_others(&mut self, found: Vec<GraspTarget>, chosen: Option<&GraspTarget>) {
-        self.others = found;
-        self.others.retain(|other| other.score >= sdg_robot::SURE && chosen.is_none_or(|chosen| other != chosen));
-    }
 }
 
 /// The heights at which a part is searched that is expected at a height, in metres.
@@ -416,16 +424,17 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let found = self.find_all(arm, higher_m, heights_m.as_ref());
         self.last = last;
         let found = found?;
-        let sure = found.iter().copied().filter(|target| target.score >= sdg_robot::SURE);
-        let nearest = sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)));
-        self.keep_others(found, nearest.as_ref());
-        Ok(nearest)
+        let sure = found.iter().enumerate().filter(|(_, (target, _))| target.score >= sdg_robot::SURE);
+        let nearest = sure.min_by(|(_, (a, _)), (_, (b, _))| apart_m(a).total_cmp(&apart_m(b)));
+        let nearest = nearest.map(|(idx, _)| idx);
+        Ok(self.choose(found, nearest))
     }
 
     fn sight(&mut self, arm: &mut A, expected: &GraspTarget) -> sdg_robot::Result<Vec<Sighting>> {
         let expected_at = expected.base_from_tcp.translation;
         let higher_m = self.higher_m(&expected.base_from_tcp);
-        let sightings = self.look(arm, higher_m, Some(&heights_around(higher_m)))?;
+        let seen = self.look(arm, higher_m, Some(&heights_around(higher_m)))?;
+        let sightings: Vec<Sighting> = seen.into_iter().map(|(sighting, _)| sighting).collect();
         let is_near = |sighting: &Sighting| {
             let apart = sighting.target.base_from_tcp.translation.vector - expected_at.vector;
             sighting.target.score >= sdg_robot::MIN_CONFIRMING_SCORE && apart.xy().norm() <= SAME_PART_M

@@ -4,7 +4,8 @@ use sdg_grasp::GraspModel;
 use sdg_robot::height::GivenHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, CompliantArm, GraspConfig, GraspTarget, Pace, PlaceGoal, PlacingConfig, Result, Robot, SafetyLimits, TouchDown,
+    Arm, CompliantArm, GraspConfig, GraspTarget, KnownTarget, Pace, PlaceGoal, PlacingConfig, Result, Robot,
+    SafetyLimits, TouchDown,
 };
 
 use crate::dry_run::DryRun;
@@ -97,13 +98,21 @@ impl GraspTask {
         finder
     }
 
-    /// Plans the grasp from the arm's current posture; nothing moves. `target` is the part's pose, if it is visible.
+    /// Plans the grasp from the arm's current posture; nothing moves. `target` is the part's pose, if it is visible, and
+    /// `others` are the other visible parts.
     ///
     /// # Errors
     /// The arm's state cannot be read; the errors of [`DryRun::plan`].
-    pub fn plan<A: Arm>(&self, arm: &mut A, limits: SafetyLimits, target: Option<GraspTarget>) -> Result<DryRun> {
+    pub fn plan<A: Arm>(
+        &self,
+        arm: &mut A,
+        limits: SafetyLimits,
+        target: Option<GraspTarget>,
+        others: Vec<GraspTarget>,
+    ) -> Result<DryRun> {
         let (state, hand) = (arm.state()?, arm.hand()?);
-        DryRun::plan(state, hand, target, limits, self.camera.pose, &self.config, self.place.as_ref())
+        let seen = KnownTarget::new(target, self.camera.pose, &self.config).with_others(others);
+        DryRun::plan(state, hand, seen, limits, self.camera.pose, &self.config, self.place.as_ref())
     }
 
     /// Grasps the part and, if there is a place, puts it there.

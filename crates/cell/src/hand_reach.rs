@@ -14,7 +14,7 @@ const MARGIN_M: f64 = 0.003;
 
 /// Squares of the table, each with the number of hand angles at which it is reached.
 pub struct Reach {
-    /// All squares of the area.
+    /// All squares of the area whose centre is on the table.
     pub squares: Vec<Square>,
     /// Width of a square, in metres.
     pub grid_m: f64,
@@ -30,8 +30,8 @@ pub struct Square {
 }
 
 impl Reach {
-    /// Computes the reach in an area of the table (x and y in the base frame, in metres), with the tcp at `height_m`
-    /// above the table, among the workcell's obstacles and inside its workspace.
+    /// Computes the reach in an area (x and y in the base frame, in metres) as far as the table extends, with the tcp at
+    /// `height_m` above the table, among the workcell's obstacles and inside its workspace.
     ///
     /// # Errors
     /// None for a workcell that was read from a file.
@@ -40,12 +40,17 @@ impl Reach {
         model.allow(Body::HAND, "table")?;
         let mut checker = Checker::new(&model, MARGIN_M);
         let count = |[low, high]: [f64; 2]| ((high - low) / grid_m).floor().max(1.0) as usize;
+        let is_on_table = |p: &Point2<f64>| {
+            workcell.table_m.is_none_or(|[x, y]| (x[0]..=x[1]).contains(&p.x) && (y[0]..=y[1]).contains(&p.y))
+        };
         let mut squares = Vec::new();
         for column in 0..count(x) {
             for row in 0..count(y) {
                 let at_m = Point2::new(x[0] + (column as f64 + 0.5) * grid_m, y[0] + (row as f64 + 0.5) * grid_m);
-                let num_turns = num_turns(workcell, &mut checker, at_m, workcell.table_height_m + height_m);
-                squares.push(Square { at_m, num_turns });
+                if is_on_table(&at_m) {
+                    let num_turns = num_turns(workcell, &mut checker, at_m, workcell.table_height_m + height_m);
+                    squares.push(Square { at_m, num_turns });
+                }
             }
         }
         Ok(Self { squares, grid_m, height_m })
@@ -123,4 +128,25 @@ fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f
             })
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_reached_beside_the_table_does_not_count() {
+        let shipped = include_str!("../../../datasets/workcell/workcell.toml");
+        let reached = |table: &str| {
+            let text = shipped.replace("height_mm = 0.0", &format!("{table}height_mm = 0.0"));
+            let workcell = Workcell::from_toml(&text).unwrap();
+            let reach = Reach::of(&workcell, [[0.3, 0.71], [-0.4, 0.41]], 0.1, 0.02).unwrap();
+            reach.squares.iter().filter(|square| square.num_turns > 0).map(|square| square.at_m).collect::<Vec<_>>()
+        };
+        let whole = reached("");
+        assert_eq!(reached("x_mm = [0, 1000]\ny_mm = [-600, 600]\n"), whole);
+        let left: Vec<_> = whole.iter().copied().filter(|at_m| at_m.y > 0.0).collect();
+        assert!(!left.is_empty() && left.len() < whole.len(), "{whole:?}");
+        assert_eq!(reached("x_mm = [0, 1000]\ny_mm = [0, 600]\n"), left);
+    }
 }

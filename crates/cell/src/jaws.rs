@@ -61,10 +61,14 @@ fn region(detection: &GraspDetection) -> Polygon {
 }
 
 impl Perception {
-    /// As [`Self::touched_by_jaws`] for the detections with at least `min_score`; the other detections touch nothing
-    /// and are not touched.
-    pub fn touched_among_accepted(&self, detections: &[&GraspDetection], min_score: f64) -> Vec<Vec<usize>> {
-        let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| detections[idx].score >= min_score).collect();
+    /// As [`Self::touched_by_jaws`] for the accepted detections, which `is_accepted` tells by their index; the other
+    /// detections touch nothing and are not touched.
+    pub fn touched_among_accepted(
+        &self,
+        detections: &[&GraspDetection],
+        is_accepted: impl Fn(usize) -> bool,
+    ) -> Vec<Vec<usize>> {
+        let accepted: Vec<usize> = (0..detections.len()).filter(|&idx| is_accepted(idx)).collect();
         let among: Vec<&GraspDetection> = accepted.iter().map(|&idx| detections[idx]).collect();
         let mut touched = vec![Vec::new(); detections.len()];
         for (&idx, others) in accepted.iter().zip(self.touched_by_jaws(&among)) {

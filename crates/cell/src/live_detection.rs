@@ -95,12 +95,28 @@ pub struct FrameDetector {
     tracker: Option<LiveTracker>,
     /// The time between stored pictures; `None` if frames have their own times.
     interval: Option<Duration>,
-    /// The time from which frame times are measured.
-    first: Option<SystemTime>,
+    clock: FrameClock,
 }
 
-/// Interval for stored pictures without a frame rate: such pictures may be unrelated.
+/// Interval for pictures that may be unrelated: stored pictures without a frame rate, and those before and after a
+/// clock was set back.
 const UNRELATED: Duration = Duration::from_secs(1);
+
+/// The time since a camera's first frame, which never goes back.
+#[derive(Debug, Default)]
+struct FrameClock {
+    last: Option<SystemTime>,
+    since_first: Duration,
+}
+
+impl FrameClock {
+    /// The time at a frame that was captured at `captured` by the system's clock, which may have been set back.
+    fn at(&mut self, captured: SystemTime) -> Duration {
+        let last = self.last.replace(captured).unwrap_or(captured);
+        self.since_first = self.since_first.saturating_add(captured.duration_since(last).unwrap_or(UNRELATED));
+        self.since_first
+    }
+}
 
 impl FrameDetector {
     /// Creates a detector. `tracking` configures tracking; `None` searches each frame independently. `frames_wait` is
@@ -129,7 +145,7 @@ impl FrameDetector {
             LiveTracker::new(&detector, config, SearchTime::AsItTakes { threads: None })
         };
         let tracker = tracking.map(follow).transpose()?;
-        Ok(Self { detector, verification, tracker, interval, first: None })
+        Ok(Self { detector, verification, tracker, interval, clock: FrameClock::default() })
     }
 
     /// The parts in a frame.
@@ -142,10 +158,9 @@ impl FrameDetector {
             let found = self.detector.detect(picture, self.verification)?;
             return Ok(found.into_iter().map(|found| Part { found, track: None }).collect());
         };
-        let first = *self.first.get_or_insert(frame.captured);
         let since = match self.interval {
             Some(interval) => interval.mul_f64(frame.number as f64),
-            None => frame.captured.duration_since(first).unwrap_or_default(),
+            None => self.clock.at(frame.captured),
         };
         let parts = tracker.frame(Arc::clone(picture), since)?;
         let part = |part: sdg_grasp::TrackedPart| Part {
@@ -160,5 +175,19 @@ impl FrameDetector {
     /// The perception used for detection.
     pub fn perception(&self) -> &Perception {
         &self.detector
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_back_goes_on_with_an_unrelated_frame() {
+        let mut clock = FrameClock::default();
+        let times =
+            [100.0, 101.0, 0.0, 0.03].map(|secs| clock.at(SystemTime::UNIX_EPOCH + Duration::from_secs_f64(secs)));
+        assert_eq!(times, [0.0, 1.0, 2.0, 2.03].map(Duration::from_secs_f64));
+        assert!(times[2] - times[1] > TrackerConfig::DEFAULT.search_every);
     }
 }

@@ -90,7 +90,7 @@ impl DetectionWords<'_> {
     /// For each detection, the indices of the detections whose parts the jaws would touch at its grasp. Only accepted
     /// detections are compared.
     pub fn touched(&self, detections: &[&GraspDetection]) -> Vec<Vec<usize>> {
-        self.detector.touched_among_accepted(detections, self.min_score)
+        self.detector.touched_among_accepted(detections, |idx| self.is_accepted(detections[idx]))
     }
 
     /// Indices of the refused detections, best first, that get marks and text in a picture: the best one, and others

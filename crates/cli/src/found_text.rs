@@ -1,6 +1,6 @@
 //! The text line of a detection, with colours and options.
 
-use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, advice_for, advice_in_words};
+use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, Part, advice_for, advice_in_words, track_state_name};
 use sdg_grasp::{Advice, GraspDetection};
 
 use crate::paint::{Paint, Tone};
@@ -28,6 +28,19 @@ impl FoundText<'_> {
         let detection = &found.detection;
         let refused =
             self.refusal(detection).map(|why| format!("; {} {why}", self.doubtful("refused:"))).unwrap_or_default();
+        self.described(found, self.words.is_accepted(detection), &refused, touched)
+    }
+
+    /// A part of a frame in words. A tracked part is accepted while it is seen, and its line begins with its state.
+    pub fn part_line(&self, part: &Part, touched: &[&GraspDetection]) -> String {
+        let Some((id, state, _)) = part.track else { return self.line(&part.found, touched) };
+        let state = track_state_name(state).replace('_', " ");
+        let is_seen = part.is_seen(self.words.min_score);
+        format!("part {} {state}, {}", id + 1, self.described(&part.found, is_seen, "", touched))
+    }
+
+    fn described(&self, found: &Found, is_accepted: bool, refused: &str, touched: &[&GraspDetection]) -> String {
+        let detection = &found.detection;
         let at = |other: &&GraspDetection| format!("({:.0}, {:.0})", other.grasp.x, other.grasp.y);
         let places: Vec<String> = touched.iter().map(at).collect();
         let touching = match places.as_slice() {
@@ -35,7 +48,7 @@ impl FoundText<'_> {
             [place] => format!("; {} the jaws would touch the part at {place}", self.doubtful("warning:")),
             _ => format!("; {} the jaws would touch the parts at {}", self.doubtful("warning:"), places.join(", ")),
         };
-        let tone = if self.words.is_accepted(detection) { Tone::Good } else { Tone::Doubtful };
+        let tone = if is_accepted { Tone::Good } else { Tone::Doubtful };
         format!(
             "{} at {}; score {:.2} ({}; turn by {}){refused}{touching}",
             self.paint.text(tone, "grasp"),

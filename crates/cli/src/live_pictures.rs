@@ -7,6 +7,7 @@ use clap::Args;
 use sdg_camera::{Address, Camera, CameraError, Encoding, Fault, Frame, OpenOptions};
 
 use crate::exit::Usage;
+use crate::interrupt::Interrupt;
 use crate::shared_args::seconds;
 
 /// A camera and its settings.
@@ -168,13 +169,14 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| "expected width and height in pixels, as in 640x480".to_owned())
 }
 
-/// The next frame; temporary faults are printed and skipped, up to a maximum number.
+/// The next frame; `None` after the last one, or if Ctrl-C was pressed before a frame came. Temporary faults are printed
+/// and skipped, up to a maximum number.
 ///
 /// # Errors
 /// A permanent fault, or too many temporary ones in a row.
-pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
+pub fn next_frame(camera: &mut dyn Camera, interrupt: &Interrupt) -> Result<Option<Frame>> {
     let mut num_faults = 0;
-    loop {
+    while !interrupt.is_requested() {
         match camera.next_frame() {
             Ok(frame) => return Ok(frame),
             // A folder that gets no picture for a while is no fault.
@@ -186,6 +188,7 @@ pub fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
             Err(error) => return Err(error.into()),
         }
     }
+    Ok(None)
 }
 
 #[cfg(test)]
@@ -220,7 +223,7 @@ mod tests {
         let mut camera = LatestFrame::spawn(Box::new(Recovering(0, send)));
         // The call after the frame shows that the frame is stored.
         has_frame.recv().unwrap();
-        assert_eq!(next_frame(&mut camera).unwrap().unwrap().number, 0);
+        assert_eq!(next_frame(&mut camera, &Interrupt::default()).unwrap().unwrap().number, 0);
     }
 
     #[test]

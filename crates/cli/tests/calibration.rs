@@ -295,11 +295,12 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
     );
 }
 
-/// `poses.yaml` of a camera on the hand, and its pictures.
+/// `poses.yaml` of a camera on the hand, and its pictures. With the inverse poses, in `beside.yaml`, the same result
+/// is that of a camera beside the robot.
 fn hand_eye(files: &Folder, camera: &PinholeCamera, scale: f64) -> (String, Isometry3<f64>) {
     let flange_from_camera = Isometry3::from_parts(Vector3::new(0.05, -0.02, 0.06).into(), turn([0.0, 0.0, 1.0], 0.4));
     let base_from_board = Isometry3::from_parts(Vector3::new(0.4, -0.1, 0.0).into(), turn([0.0, 0.0, 1.0], 0.1));
-    let mut text = "poses:\n".to_owned();
+    let [mut on_hand, mut beside] = ["poses:\n".to_owned(), "poses:\n".to_owned()];
     let tilts =
         [[0.0, 0.0], [0.25, 0.0], [-0.25, 0.1], [0.1, 0.25], [0.1, -0.25], [0.2, 0.2], [-0.2, -0.2], [0.0, 0.28]];
     for (k, [x, y]) in tilts.into_iter().enumerate() {
@@ -307,11 +308,14 @@ fn hand_eye(files: &Folder, camera: &PinholeCamera, scale: f64) -> (String, Isom
         let pose = camera_from_board(&board(), camera, [320.0, 240.0], 0.42 + 0.02 * k as f64, [x, y, roll]);
         files.board(&format!("{k}.png"), camera, &pose);
         let base_from_flange = base_from_board * pose.inverse() * flange_from_camera.inverse();
-        let translation: [f64; 3] = (base_from_flange.translation.vector * scale).into();
-        let rotation: [f64; 4] = base_from_flange.rotation.coords.into();
-        writeln!(text, "  - picture: {k}.png\n    base_from_flange: {{translation_m: {translation:?}, rotation_xyzw: {rotation:?}}}").unwrap();
+        for (text, pose) in [(&mut on_hand, base_from_flange), (&mut beside, base_from_flange.inverse())] {
+            let translation: [f64; 3] = (pose.translation.vector * scale).into();
+            let rotation: [f64; 4] = pose.rotation.coords.into();
+            writeln!(text, "  - picture: {k}.png\n    base_from_flange: {{translation_m: {translation:?}, rotation_xyzw: {rotation:?}}}").unwrap();
+        }
     }
-    (files.text("poses.yaml", &text), flange_from_camera)
+    files.text("beside.yaml", &beside);
+    (files.text("poses.yaml", &on_hand), flange_from_camera)
 }
 
 #[test]
@@ -338,6 +342,16 @@ fn a_camera_on_the_hand_is_found_and_written() {
         1,
         &["the mount to be the other one", "with --mount"],
     );
+
+    // An impossible height of the table is reported as such, whatever file is written.
+    let beside = files.path("beside.yaml");
+    let beside = ["camera", "hand-eye", "--camera", &known, "--poses", &beside, "--mount", "base", "--out", &out];
+    stdout(&beside);
+    let of_table = |height: &str, code, parts: &[&str]| {
+        assert_refused(&[&beside[..], &["--table-height-mm", height]].concat(), code, parts);
+    };
+    of_table("5000", 1, &["hand.yaml: expected the camera 0.05 to 20 m above the table, found -4.9"]);
+    of_table("nan", 2, &["expected the table's z in millimetres, found nan"]);
 
     let of_hand = |poses: &str, measured: &str, parts: &[&str]| {
         let arguments = ["camera", "hand-eye", "--camera", &known, "--poses", poses, "--mount", "hand"];
@@ -411,6 +425,11 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
         &["known.yaml: expected --camera ", "known.yaml, which keeps its lens, or another"],
     );
     assert_eq!(fs::read(&known).unwrap(), before);
+    // Another program's calibration, whose lens model is not ours, is not replaced either.
+    let eight = String::from_utf8(before).unwrap().replace("data: [-0.31", "data: [0.0, 0.0, 0.0, -0.31");
+    let rational = files.text("rational.yaml", &eight);
+    table(&[a, "--out", &rational], 2, &["--out: expected a new file or that of an estimated camera", "with 8"]);
+    assert_eq!(fs::read_to_string(&rational).unwrap(), eight);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400"], 2, &["X,Y"]);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400000,0"], 2, &["5000 mm"]);
     let nonsense = files.text("nonsense.yaml", &fs::read_to_string(&known).unwrap().replace("450.0", "-450.0"));

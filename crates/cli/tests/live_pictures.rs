@@ -1,8 +1,11 @@
 //! `sdg camera list`, `grab` and `watch`, and invalid addresses.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use crate::camera::WRIST_CAMERA;
 use crate::picture_kinds::with_orientation;
@@ -92,7 +95,7 @@ fn grabbed_every_half_second(pause_secs: f64) -> Vec<u64> {
 
 #[test]
 fn frames_come_at_their_times_and_are_the_newest() {
-    let start = std::time::Instant::now();
+    let start = Instant::now();
     let numbers = grabbed_every_half_second(0.1);
     assert!(start.elapsed().as_secs_f64() >= 1.0);
     // Half a second is five pictures, fewer on a busy machine. Without skipping, the pictures would be 0, 1, 2.
@@ -100,6 +103,34 @@ fn frames_come_at_their_times_and_are_the_newest() {
     // In a pause, the time of the second and of the third frame passes; the third is still half a second later.
     let numbers = grabbed_every_half_second(1.3);
     assert!(numbers[2] >= numbers[1] + 2, "{numbers:?}");
+}
+
+#[test]
+fn ctrl_c_ends_the_wait_for_a_frame_and_keeps_the_frames_so_far() {
+    let (from, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    RgbImage::from_pixel(32, 24, Rgb([60; 3])).save(from.path().join("a.png")).unwrap();
+    let (address, folder) = (format!("dir:{}?follow", from.path().display()), out.path().to_str().unwrap());
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+        .args(["camera", "grab", "--from", &address, "--count", "2", "--stall-secs", "0.1", "--out", folder])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.contains("frame 0, 32 × 24 pixels"), "{first}");
+    // No further picture comes.
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().unwrap();
+            panic!("still waits for a frame");
+        }
+        sleep(Duration::from_millis(20));
+    }
+    assert_refused(&child.wait_with_output().unwrap(), 0, &["1 of 2 frames; interrupted"]);
+    assert_eq!(level(&out.path().join("000000.png")), 60);
 }
 
 #[test]

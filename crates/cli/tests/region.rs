@@ -133,6 +133,17 @@ fn with_a_camera_the_region_is_one_of_its_pictures() {
     };
     assert!(teach(ON_IT).status.success());
     assert_eq!(detect(&again, &["--camera", &camera, &photo()])["region"]["y"], 140);
+    // A camera with pictures of another size, which the model's region does not fit: another region replaces it.
+    let smaller = CAMERA.replace("width: 640", "width: 600").replace("height: 480", "height: 450");
+    let (smaller, cut) = (folder.text("smaller.yaml", &smaller), folder.path("cut.png"));
+    image::open(photo()).unwrap().crop_imm(0, 0, 600, 450).save(&cut).unwrap();
+    let arguments = ["detect", "--grasp-model", &again, "--camera", &smaller, &cut];
+    let error = refusal(&arguments).1;
+    assert!(error.contains("expected a picture of 640 × 480 pixels"), "{error}");
+    for region in ["all", ON_IT] {
+        let found = detect(&again, &["--camera", &smaller, "--region", region, &cut]);
+        assert!(found["detections"][0]["score"].as_f64().unwrap() > 0.5, "{region}: {found}");
+    }
     let small = String::from_utf8(teach("300,200,30,30").stderr).unwrap();
     assert!(small.contains("--region: expected a region that the part fits in"), "{small}");
 }

@@ -68,9 +68,13 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
     let num_part = drawn.pixels().filter(|pixel| is_part(pixel)).count();
     assert!(num_part >= 20, "{num_part} pixels");
 
-    let done = sdg(&[&base[..], &from, &["--speed", "0.6", "--json", "--out", text(&out)]].concat());
+    // After consent the dry run is executed, and the cell is drawn as without one.
+    let grasp = out.join("grasp.png");
+    assert!(!grasp.exists());
+    let executed = ["--dry-run", "--yes", "--speed", "0.6", "--json", "--out", text(&out)];
+    let done = sdg(&[&base[..], &from, &executed].concat());
     let stderr = String::from_utf8(done.stderr).unwrap();
-    assert!(done.status.success(), "{stderr}");
+    assert!(done.status.success() && grasp.exists(), "{stderr}");
     let line: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!((&line["held"], &line["step"], &line["looks"]), (&true.into(), &"hold".into(), &vec![1, 1].into()));
     let width_m = line["closed_width_m"].as_f64().unwrap();

@@ -14,20 +14,28 @@ use crate::sequence::GraspConfig;
 /// Assumed accuracy of positions, in m, and of sizes, as a fraction.
 const EXACT: f64 = 1e-4;
 
-/// Finds the same target, or none, for any pose of the arm. After the part was put down, finds it at its intended pose.
-#[derive(Debug, Clone, Copy)]
+/// Finds the same target, or none, and the same other parts for any pose of the arm. After the part was put down, finds
+/// it at its intended pose.
+#[derive(Debug, Clone)]
 pub struct KnownTarget {
     target: Option<GraspTarget>,
+    others: Vec<GraspTarget>,
     camera: CameraPose,
     /// Distance of the grasp below the marks, m.
     marks_over_grasp_m: f64,
 }
 
 impl KnownTarget {
-    /// A known target, for a sequence with this camera and configuration.
+    /// A known target without other parts, for a sequence with this camera and configuration.
     pub fn new(target: Option<GraspTarget>, camera: CameraPose, config: &GraspConfig) -> Self {
         let marks_over_grasp_m = config.height.map_or(0.0, |height| height.marks_over_grasp_m());
-        Self { target, camera, marks_over_grasp_m }
+        Self { target, others: Vec::new(), camera, marks_over_grasp_m }
+    }
+
+    /// Sets the other parts that are seen beside the target.
+    #[must_use]
+    pub fn with_others(self, others: Vec<GraspTarget>) -> Self {
+        Self { others, ..self }
     }
 }
 
@@ -61,5 +69,9 @@ impl PartFinder<PlannedArm> for KnownTarget {
 
     fn surface_beside(&mut self, _pair: &[Sighting; 2], expected: &MeasuredHeight) -> Result<Option<MeasuredHeight>> {
         Ok(Some(MeasuredHeight { sigma_m: EXACT, ..*expected }))
+    }
+
+    fn others(&self) -> Vec<GraspTarget> {
+        self.others.clone()
     }
 }

@@ -10,8 +10,8 @@ use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::height::GivenHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PlannedArm, Robot, RobotError,
-    StepObserver, StopReason, Watch,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PartFinder, PlannedArm, Robot,
+    RobotError, StepObserver, StopReason, Watch,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
@@ -213,7 +213,8 @@ fn planned(
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
     let camera_pose = settings.camera.pose;
-    let mut known = KnownTarget::new(Some(target), camera_pose, config);
+    let others = PartFinder::<TrajectoryArm>::others(&*finder);
+    let mut known = KnownTarget::new(Some(target), camera_pose, config).with_others(others);
     let ended = sdg_robot::grasp(&mut robot, &mut known, &mut step, camera_pose, config);
     let (success, message) = match ended.map(|report| report.outcome) {
         Ok(GraspOutcome::Held) => (true, "the part can be grasped".to_owned()),

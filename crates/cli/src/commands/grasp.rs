@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
-use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, Pictures, SeenOutline};
+use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, ModelFinder, Pictures};
 use sdg_grasp::GraspError;
 use sdg_inputs::camera_files;
-use sdg_robot::{Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspTarget, Robot, SafetyLimits};
+use sdg_robot::{Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspTarget, PartFinder, Robot, SafetyLimits};
 
 use crate::clock;
 use crate::commands::devices;
@@ -101,7 +101,9 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
             arm.check_model(task.workcell.robot)?;
             let limits = task.workcell.safety_limits();
-            attempt(args, &task, &mut arm, limits, LivePictures(camera), &interrupt, Some(&address.to_string()))
+            let pictures = LivePictures(camera);
+            let outcome = attempt(args, &task, &mut arm, limits, pictures, &interrupt, Some(&address.to_string()))?;
+            Ok(outcome.unwrap_or(Outcome::Done))
         }
     }
 }
@@ -162,14 +164,14 @@ fn simulated(args: &GraspArgs, task: &GraspTask, interrupt: &Interrupt) -> Resul
         ..task.workcell.safety_limits()
     };
     let outcome = attempt(args, task, &mut cell, limits, sdg_evaluation::SimulatedPictures, interrupt, None)?;
-    if matches!(outcome, Outcome::Done) && !args.dry_run {
+    if matches!(outcome, Some(Outcome::Done)) {
         sdg_files::prepare_folder(&args.out)?;
         let path = args.out.join("grasp.png");
         let render = RenderConfig { width: 800, height: 600, ..RenderConfig::default() };
         sdg_files::write_png(&path, &cell.scene_image(render)?)?;
         eprintln!("the cell after the grasp: {}", path.display());
     }
-    Ok(outcome)
+    Ok(outcome.unwrap_or(Outcome::Done))
 }
 
 #[cfg(not(feature = "simulation"))]
@@ -182,6 +184,7 @@ fn simulated(_args: &GraspArgs, _task: &GraspTask, _interrupt: &Interrupt) -> Re
 }
 
 /// One grasp with any arm. A real arm, which has an address, moves only after confirmation by a person or with `--yes`.
+/// Returns `None` if the person refused and nothing was moved.
 fn attempt<A: CompliantArm, P: Pictures<A>>(
     args: &GraspArgs,
     task: &GraspTask,
@@ -190,11 +193,11 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     pictures: P,
     interrupt: &Interrupt,
     address: Option<&str>,
-) -> Result<Outcome> {
+) -> Result<Option<Outcome>> {
     let mut finder = task.finder(pictures);
     if args.dry_run {
         let target = finder.find_for_plan(arm, task.told())?;
-        dry_run(args, task, arm, limits.clone(), target, finder.seen())?;
+        dry_run(args, task, arm, limits.clone(), target, &finder)?;
     }
     if args.dry_run || address.is_some() {
         let question = match address {
@@ -203,7 +206,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         };
         if confirm(&question, args.yes)? == Consent::Refused {
             eprintln!("nothing was moved");
-            return Ok(Outcome::Done);
+            return Ok(None);
         }
     }
     let started = Instant::now();
@@ -221,19 +224,19 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     let ended = ended?;
     // Measured by the arm's own clock: a simulated arm moves faster or slower than a real one.
     let secs = robot.state().map_or(started.elapsed().as_secs_f64(), |state| state.time_secs - started_secs);
-    print_report(args, task, &ended, secs, address.unwrap_or("sim"))
+    print_report(args, task, &ended, secs, address.unwrap_or("sim")).map(Some)
 }
 
 /// Plans from the arm's current posture; draws and prints the plan.
-fn dry_run<A: Arm>(
+fn dry_run<A: Arm, P: Pictures<A>>(
     args: &GraspArgs,
     task: &GraspTask,
     arm: &mut A,
     limits: SafetyLimits,
     target: Option<GraspTarget>,
-    seen: Option<&SeenOutline>,
+    finder: &ModelFinder<P>,
 ) -> Result<()> {
-    let plan = task.plan(arm, limits, target)?;
+    let plan = task.plan(arm, limits, target, PartFinder::<A>::others(finder))?;
     eprintln!("planned, not executed:");
     print_plan(&plan)?;
     #[cfg(feature = "simulation")]
@@ -241,7 +244,7 @@ fn dry_run<A: Arm>(
         eprintln!("no motion is drawn: {missing}");
         return Ok(());
     }
-    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &task.workcell)? {
+    for file in draw_dry_run(&plan, &args.out, finder.seen().filter(|_| target.is_some()), &task.workcell)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

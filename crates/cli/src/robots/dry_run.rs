@@ -40,7 +40,7 @@ mod tests {
     use super::*;
     use sdg_kinematics::{ArmGeometry, JointVector, ready_pose};
     use sdg_robot::{
-        ArmMode, ArmState, CameraPose, GraspConfig, HandState, LookOut, SafetyLimits, camera_looking_down,
+        ArmMode, ArmState, CameraPose, GraspConfig, HandState, KnownTarget, LookOut, SafetyLimits, camera_looking_down,
     };
 
     /// The plan from a tcp at a height (m), of a part that is not visible there.
@@ -54,7 +54,8 @@ mod tests {
         let hand = HandState { opening_m: 0.08, is_grasping: false, force_n: None };
         let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose())], ..GraspConfig::default() };
         let camera = CameraPose::InBase(base_from_tcp);
-        DryRun::plan(start, hand, None, SafetyLimits::default(), camera, &config, None).unwrap()
+        let seen = KnownTarget::new(None, camera, &config);
+        DryRun::plan(start, hand, seen, SafetyLimits::default(), camera, &config, None).unwrap()
     }
 
     #[test]

@@ -186,8 +186,15 @@ const PLACEMENT_TRIES: usize = 40;
 /// Distance by which the range of distractors extends beyond the object's range, in metres.
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
 
-/// At most `count` distractors of a seed with centres between bounds in the base frame, in metres.
-pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
+/// At most `count` distractors of a seed with centres between bounds in the base frame, in metres, at a distance from
+/// the areas in `taken`.
+pub(crate) fn sample_distractors_between(
+    x_m: Range<f64>,
+    y_m: Range<f64>,
+    taken: Vec<Vec<Point2<f64>>>,
+    count: usize,
+    seed: u64,
+) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
     // If a range is narrower than both margins together, its ends are exchanged.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
@@ -199,7 +206,7 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
     };
     let config =
         VariationConfig { object_x_m: ordered(config.object_x_m), object_y_m: ordered(config.object_y_m), ..config };
-    sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
+    sample_distractors(taken, &config, &mut Stream::Distractors.rng(seed))
 }
 
 /// The object at a random pose, at a distance from the areas in `config.taken`. If none of [`OBJECT_TRIES`] poses has

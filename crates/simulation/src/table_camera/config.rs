@@ -24,7 +24,7 @@ pub struct TableCameraConfig {
     pub seed: u64,
     /// Length of the sequence in seconds; `None` for no end (`seconds`).
     pub duration_secs: Option<f64>,
-    /// Number of instances of the part, 1 to 4 (`count`).
+    /// Number of instances of the part, 1 to 4 (`count`), as far as they fit side by side.
     pub count: usize,
     /// Another part on the table (`beside`): the name of a part, or a look-alike of [`Self::part`]: `mirrored`,
     /// `feature-moved`, or a size such as `0.9`.

@@ -90,7 +90,8 @@ impl TableCamera {
     /// Builds the scene.
     ///
     /// # Errors
-    /// [`crate::SimulationError::UnknownName`] for a part that does not exist, and as for [`Renderer::new`].
+    /// [`SimulationError::UnknownName`] for a part that does not exist, [`SimulationError::Configuration`] for more parts
+    /// than fit side by side, and as for [`Renderer::new`].
     pub fn new(config: &TableCameraConfig) -> Result<Self> {
         let spec = ObjectSpec::by_name(&config.part)?;
         let beside = config.part_beside(&spec)?;
@@ -99,8 +100,17 @@ impl TableCamera {
         let lanes = lanes(config.count + usize::from(beside.is_some()), config.num_things > 0);
         let mut moving = Vec::new();
         let specs = std::iter::repeat_n(&spec, config.count).chain(&beside);
-        for (idx, (spec, lane)) in specs.zip(lanes).enumerate() {
+        for (idx, (spec, lane)) in specs.zip(&lanes).enumerate() {
             let (middle, radius_m) = middle_of(spec);
+            let [width_mm, length_mm] = [lane.y_m[1] - lane.y_m[0], 2.0 * radius_m].map(|metres| 1e3 * metres);
+            if length_mm > width_mm {
+                let name = &spec.name;
+                return Err(SimulationError::Configuration {
+                    field: "count",
+                    expected: format!("parts of at most {width_mm:.1} mm for {} side by side", lanes.len()),
+                    found: format!("the part {name} of {length_mm:.1} mm"),
+                });
+            }
             let is_part = idx < config.count;
             let speed_m_s = if is_part { config.speed_m_s } else { 0.0 };
             let turn_rad_s = if is_part { config.turn_rad_s } else { 0.0 };
@@ -311,20 +321,47 @@ mod tests {
 
     #[test]
     fn all_of_the_part_keep_apart_from_each_other_and_from_what_lies_beside() {
-        let mut camera = TableCamera::new(&"key?count=3&beside=mirrored&things=3&fps=2".parse().unwrap()).unwrap();
-        for _ in 0..6 {
-            assert_eq!(camera.next_view().unwrap().unwrap().truths.len(), 3);
-            let outlines: Vec<_> = camera
-                .moving
-                .iter()
-                .map(|moving| {
+        for (address, count) in
+            [("key?count=3&beside=mirrored&things=3&fps=2", 3), ("fuel_line?count=2&things=6&fps=2", 2)]
+        {
+            let mut camera = TableCamera::new(&address.parse().unwrap()).unwrap();
+            let things = scene(&camera.config, &camera.moving[0].spec).distractors;
+            for _ in 0..6 {
+                assert_eq!(camera.next_view().unwrap().unwrap().truths.len(), count);
+                let parts = camera.moving.iter().map(|moving| {
                     let base_from_object = moving.base_from_object();
                     PlacedObject { spec: moving.spec.clone(), base_from_object }.footprint()
-                })
-                .collect();
-            for (idx, outline) in outlines.iter().enumerate() {
-                assert!(outlines[..idx].iter().all(|other| footprint::separation(outline, other) > 0.0));
+                });
+                let outlines: Vec<_> = parts.chain(things.iter().map(|thing| thing.footprint.clone())).collect();
+                for (idx, outline) in outlines.iter().enumerate() {
+                    assert!(outlines[..idx].iter().all(|other| footprint::separation(outline, other) > 0.0));
+                }
             }
+        }
+    }
+
+    #[test]
+    fn no_distractor_of_any_seed_reaches_into_a_lane() {
+        let spec = ObjectSpec::by_name("key").unwrap();
+        let end_m = lanes(1, true)[0].y_m[1];
+        let mut num_things = 0;
+        for seed in 0..20 {
+            let config = TableCameraConfig { seed, num_things: 6, ..TableCameraConfig::new("key") };
+            for thing in scene(&config, &spec).distractors {
+                assert!(thing.footprint.iter().all(|corner| corner.y >= end_m - 1e-9), "{seed}: {thing:?}");
+                num_things += 1;
+            }
+        }
+        assert!(num_things > 20, "{num_things}");
+    }
+
+    #[test]
+    fn more_parts_than_fit_side_by_side_are_refused() {
+        for (address, name) in [("fuel_line?count=4", "fuel_line"), ("key?count=3&beside=fuel_line", "fuel_line")] {
+            let error = TableCamera::new(&address.parse().unwrap()).err().unwrap().to_string();
+            let expected =
+                format!("count: expected parts of at most 155.0 mm for 4 side by side, found the part {name} of 226");
+            assert!(error.starts_with(&expected), "{error}");
         }
     }
 }

@@ -59,7 +59,11 @@ pub(super) fn scene(config: &TableCameraConfig, spec: &ObjectSpec) -> SceneVaria
     scene.object = Some(placed());
     scene.instances = (1..config.count).map(|_| placed()).collect();
     let strip = SHOWN.y_m[1] - STRIP_M..SHOWN.y_m[1];
-    scene.distractors = sample_distractors_between(SHOWN.x_m[0]..SHOWN.x_m[1], strip, config.num_things, config.seed);
+    // A distractor may reach the border of the lanes, but not beyond it.
+    let end_m = strip.start - VariationConfig::default().clearance_m;
+    let lanes = [[-1.0, -1.0], [2.0, -1.0], [2.0, end_m], [-1.0, end_m]].map(Point2::from).to_vec();
+    let x_m = SHOWN.x_m[0]..SHOWN.x_m[1];
+    scene.distractors = sample_distractors_between(x_m, strip, vec![lanes], config.num_things, config.seed);
     scene
 }
 

@@ -71,7 +71,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         while Instant::now() < due && !interrupt.is_requested() {
             std::thread::sleep(due.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)));
         }
-        let Some(frame) = next_frame(camera.as_mut())? else {
+        let Some(frame) = next_frame(camera.as_mut(), &interrupt)? else {
             break;
         };
         // From this frame and not from the start: after a pause of the camera, missed frames are not made up for.

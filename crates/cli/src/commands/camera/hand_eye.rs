@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, ValueEnum};
-use sdg_calibration::{CalibratedCamera, CalibrationError, HandEye, RobotPose, calibrate_hand_eye};
+use sdg_calibration::{CalibrationError, HandEye, RobotPose, calibrate_hand_eye};
 use sdg_geometry::{Mount, upper_median};
 use sdg_inputs::{camera_files, robot_poses};
 use serde_json::{Value, json};
@@ -28,7 +28,7 @@ pub struct HandEyeArgs {
     #[command(flatten)]
     board: BoardInUse,
     /// The table's z in the robot's base, for a camera beside the robot; default: the value in the camera file, else 0
-    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, value_parser = table_height_mm)]
     table_height_mm: Option<f64>,
     /// The file to write, with the camera's pose; default: nothing is written
     #[arg(long, value_name = "FILE")]
@@ -87,7 +87,6 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     if let Some(out) = &args.out {
         let camera = found.mounted(camera, mount, args.table_height_mm.map(|height| height / 1000.0));
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
-        CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
         sdg_files::extend(out, Some(&args.camera), text.as_bytes())?;
     }
     for (k, pose) in seen.iter().enumerate() {
@@ -99,6 +98,12 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     }
     report(args, mount, &found, &seen, lines)?;
     Ok(Outcome::Done)
+}
+
+/// Parses the table's z, which can be any finite number: the camera's height above it is checked later.
+fn table_height_mm(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| format!("expected the table's z in millimetres, found {text}"))
 }
 
 /// Adds the option that corrects the error.

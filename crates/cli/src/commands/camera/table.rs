@@ -69,8 +69,8 @@ pub struct TableArgs {
     /// Focal length in pixels, for a camera without a file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// The file to write, with `table:`; default: the camera file. The file of a calibrated camera is not replaced
-    /// without --camera
+    /// The file to write, with `table:`; default: the camera file. Without --camera, an existing file is replaced only
+    /// if its camera was estimated
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -124,15 +124,21 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Checks that a file which is replaced by an estimated camera does not contain a calibrated one. It is not registered
-/// as an input, because it may be replaced.
+/// Checks that a file which is replaced by an estimated camera contains nothing but another estimate: a file that cannot
+/// be read may be that of a camera with another lens model. It is not registered as an input, because it may be replaced.
 fn check_is_not_calibrated(out: &Path) -> Result<()> {
-    let Ok(text) = std::fs::read_to_string(out) else { return Ok(()) };
-    if CalibratedCamera::from_yaml(&text).is_ok_and(|camera| camera.name != UNCALIBRATED) {
-        let out = named(out);
-        return Err(Usage(format!("{out}: expected --camera {out}, which keeps its lens, or another --out")).into());
+    let bytes = std::fs::read(out).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    if text.trim().is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let out = named(out);
+    let refusal = match CalibratedCamera::from_yaml(&text) {
+        Ok(camera) if camera.name == UNCALIBRATED => return Ok(()),
+        Ok(_) => format!("{out}: expected --camera {out}, which keeps its lens, or another --out"),
+        Err(error) => format!("--out: expected a new file or that of an estimated camera, found {out}: {error}"),
+    };
+    Err(Usage(refusal).into())
 }
 
 /// The sheet's position and direction in the frame of the camera file.

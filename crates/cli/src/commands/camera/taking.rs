@@ -91,7 +91,7 @@ impl TakingArgs {
         let mut session: Option<BoardSession<'_>> = None;
         let mut pictures = Vec::new();
         while !interrupt.is_requested() {
-            let Some(Frame { mut picture, .. }) = next_frame(camera.as_mut())? else { break };
+            let Some(Frame { mut picture, .. }) = next_frame(camera.as_mut(), &interrupt)? else { break };
             let size = picture.dimensions();
             let session = session.get_or_insert_with(|| BoardSession::new(board, config(size), is_live));
             if session.size() != size {

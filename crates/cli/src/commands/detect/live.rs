@@ -14,7 +14,6 @@ use image::RgbImage;
 use sdg_camera::{Address, Fault, Frame, MjpegServer};
 use sdg_cell::{
     DetectionWords, FrameDetector, FrameRecord, FrameSize, FrameSizes, Frames, Next, Part, Perception, drawing,
-    track_state_name,
 };
 use sdg_grasp::{GraspDetection, TrackerConfig, Verification};
 
@@ -143,7 +142,7 @@ fn write_line(
     let words = DetectionWords { detector, picture_size: [width, height], min_score: args.min_score };
     let text = FoundText { words, paint: Paint::stdout() };
     let detections: Vec<&GraspDetection> = shown.iter().map(|part| &part.found.detection).collect();
-    let touched = words.touched(&detections);
+    let touched = detector.touched_among_accepted(&detections, |idx| shown[idx].is_seen(args.min_score));
     if args.json {
         let line = FrameRecord::new(frame, (width, height), detector, seconds, &shown, touched);
         writeln!(out, "{}", json_line(&line)?)?;
@@ -157,11 +156,8 @@ fn write_line(
         }
         for (part, touched) in shown.iter().zip(touched) {
             let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
-            let of = part
-                .track
-                .map(|(id, state, _)| format!("part {} {}, ", id + 1, track_state_name(state).replace('_', " ")));
-            let line = text.line(&part.found, &touched);
-            writeln!(out, "frame {}: {}{line} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
+            let line = text.part_line(part, &touched);
+            writeln!(out, "frame {}: {line} ({:.1} ms)", frame.number, 1e3 * seconds)?;
         }
     }
     // Flushed, because programs that read the output wait for the lines of this frame.
@@ -178,4 +174,59 @@ fn write_error(out: &mut impl Write, args: &DetectArgs, address: &Address, error
         eprintln!("{error}");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::time::Duration;
+
+    use clap::Parser;
+    use nalgebra::Vector2;
+    use sdg_evaluation::shipped;
+    use sdg_grasp::{ModelKind, TeachOptions, TrackState, teach};
+    use serde_json::Value;
+
+    use super::*;
+    use crate::args::{Args, Command};
+
+    #[test]
+    fn a_tracked_part_is_accepted_while_it_is_followed() {
+        let photo = shipped::demonstration("pendulum").unwrap();
+        let picture = photo.image.clone();
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        let model = teach(&[photo], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        let perception = Perception::of_any_camera(model);
+        let found = perception.detect(&picture, Verification::ByShape).unwrap().remove(0);
+        // The jaws at the first part would touch the second one.
+        let part = |id: u64, beside_px: [f64; 2], score: f64, state: TrackState| {
+            let mut found = found.clone();
+            let detection = &mut found.detection;
+            detection.score = score;
+            detection.grasp.x += beside_px[0];
+            detection.grasp.y += beside_px[1];
+            let corners = &mut detection.outline.as_mut().unwrap().vertices;
+            corners.iter_mut().for_each(|corner| *corner += Vector2::from(beside_px));
+            Part { found, track: Some((id, state, Duration::ZERO)) }
+        };
+        let printed = |state: TrackState, form: &str| {
+            let line = ["sdg", "detect", "--grasp-model", "m", "--from", "v4l:", "--all", form];
+            let Command::Detect(args) = Args::try_parse_from(line).unwrap().command else { panic!("another command") };
+            let parts = [part(0, [0.0, 0.0], 0.9, state), part(1, [59.0, -6.0], 0.4, TrackState::Followed)];
+            let frame = Frame::new(RgbImage::new(1, 1), 0, "v4l:".into());
+            let mut out = Vec::new();
+            write_line(&mut out, &args, &perception, &frame, picture.dimensions(), 0.0, &parts).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let touched = |state: TrackState| {
+            let line: Value = serde_json::from_str(&printed(state, "--json")).unwrap();
+            [0_usize, 1].map(|idx| line["detections"][idx]["jaws_touch"].clone())
+        };
+        assert_eq!(touched(TrackState::Followed)[0], serde_json::json!([1]));
+        assert_eq!(touched(TrackState::Lost), [Value::Null, Value::Null]);
+        let told = printed(TrackState::Lost, "--every-frame");
+        assert!(told.contains("part 1 lost, ") && told.contains("part 2 followed, "), "{told}");
+        assert!(!told.contains("refused") && !told.contains("warning"), "{told}");
+    }
 }

@@ -46,6 +46,10 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
         model = model.with_max_detections(args.max as usize)?;
     }
+    if args.region.is_some() {
+        // The model's region, which is replaced, may not fit this camera's pictures.
+        model = model.with_region(None)?;
+    }
     let mut detector = camera_files::perception(model, &args.grasp_model, args.camera.as_deref())?;
     match args.region {
         None => {}
