@@ -16,6 +16,7 @@ mod pictures;
 mod places;
 mod robots;
 mod ros;
+mod ros_seeds;
 mod written_marks;
 
 pub use checkpoints::costliest_pickles;
