@@ -263,6 +263,9 @@ def others():
     by_pillow("palette.webp", picture().quantize(8).convert("RGB"), "WEBP", lossless=True, method=6)
     moving = [picture((8, 6)), picture((8, 6)).rotate(180)]
     by_pillow("animated.webp", moving[0], "WEBP", save_all=True, append_images=moving[1:], duration=50, lossless=True)
+    for frame in moving:
+        frame.putalpha(Image.linear_gradient("L").resize(frame.size))
+    by_pillow("animated-alpha.webp", moving[0], "WEBP", save_all=True, append_images=moving[1:], duration=50, quality=20)
 
     by_pillow("progressive.jpg", picture(), "JPEG", quality=30, progressive=True)
     by_pillow("progressive-turned.jpg", picture((9, 7)), "JPEG", quality=30, progressive=True, subsampling=0, exif=exif)

@@ -238,6 +238,7 @@ pub(super) const OTHERS: Target = Target {
             "lossy-alpha-turned.webp",
             "palette.webp",
             "animated.webp",
+            "animated-alpha.webp",
             "palette.bmp",
             "palette-4.bmp",
             "runs-8.bmp",
