@@ -79,7 +79,7 @@ impl ModelFile {
                 "mark_height_m": 0.02,
                 "grasp_height_m": 0.01,
                 "slant": [0.1, -0.05],
-                "further_slants": [[0.0, 0.2], [0.1, 0.1]],
+                "further_slants": [[0.0, 0.2]],
                 "edges": {"height_m": -0.003, "sigma_m": 0.002},
             },
             "region": {"x": 10, "y": 20, "width": 500, "height": 400, "picture": [640, 480]},
@@ -93,8 +93,8 @@ impl ModelFile {
             "negatives": {"pictures": 3, "refused": 2, "log_odds": -0.25},
             "base_weights_sha256": "0".repeat(64),
         });
-        let marks = [marks("bar", true), marks("", false), marks("a \"round\" bar\n", true)];
-        let photos = [photo(Light::Even), photo(Light::Even), photo(Light::AsOnARoundBody)];
+        let marks = [marks("a \"round\" bar\n", true), marks("", false)];
+        let photos = [photo(Light::AsOnARoundBody), photo(Light::Even)];
         Self::new(&metadata(ModelKind::S, &marks, &teaching), &StateDict::new(), &photos)
     }
 
@@ -121,7 +121,7 @@ impl ModelFile {
         }
         let mut metadata = metadata(kind, &[marks("bar", true)], &teaching);
         metadata.extend(further.into_iter().map(|(key, value)| (key, value.to_string())));
-        Self::new(&metadata, &weights, &[photo(Light::Even)])
+        Self::new(&metadata, &weights, &[photo(Light::AsOnARoundBody)])
     }
 
     /// Base weights for the networks of [`small_detector`].
@@ -144,7 +144,7 @@ impl ModelFile {
 #[derive(Clone, Copy)]
 enum Light {
     Even,
-    /// Darker towards both long sides: a part of revolution.
+    /// Darker towards both long sides: a part of revolution, which needs the least preparation for a search.
     AsOnARoundBody,
 }
 
