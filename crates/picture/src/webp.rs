@@ -24,33 +24,38 @@ struct Chunk<'a> {
 /// # Errors
 /// A lossy frame of another size than announced, or an Exif block that ends beyond the file.
 pub(crate) fn check_chunks(bytes: &[u8]) -> Result<(), PictureError> {
-    let damaged = |reason: String| Err(PictureError::DamagedImage { format: "WebP", reason });
     let mut chunks = chunks(bytes.get(12..).unwrap_or_default());
     let Some(first) = chunks.next().filter(|chunk| chunk.name == b"VP8X") else { return Ok(()) };
     let Some(canvas) = size_at(first.content, 4) else { return Ok(()) };
     for chunk in chunks {
-        let (announced, frames) = match chunk.name {
-            b"EXIF" if chunk.is_cut => return damaged("an Exif block that ends beyond the file".to_owned()),
-            b"VP8 " => (Some(canvas), vec![chunk.content]),
-            // The decoder does not look at the name of a chunk behind a frame's alpha.
+        match chunk.name {
+            b"VP8 " | b"EXIF" => check(&chunk, Some(canvas), canvas)?,
             b"ANMF" => {
-                let content = chunk.content.get(FRAME_FIELDS..).unwrap_or_default();
-                (size_at(chunk.content, 6), self::chunks(content).map(|chunk| chunk.content).collect())
+                let announced = size_at(chunk.content, 6);
+                for part in self::chunks(chunk.content.get(FRAME_FIELDS..).unwrap_or_default()) {
+                    check(&part, announced, canvas)?;
+                }
             }
-            _ => continue,
-        };
-        for found in frames.into_iter().filter_map(lossy_size) {
-            let is_inside = announced.is_some_and(|[width, height]| width <= canvas[0] && height <= canvas[1]);
-            if Some(found) != announced || !is_inside {
-                let [width, height] = announced.unwrap_or(canvas);
-                return damaged(format!(
-                    "a frame of {} × {} pixels in place of {width} × {height}",
-                    found[0], found[1]
-                ));
-            }
+            _ => {}
         }
     }
     Ok(())
+}
+
+/// Checks a chunk in which a frame of the announced size may be. The decoder does not look at the name of a chunk behind
+/// a frame's alpha.
+fn check(chunk: &Chunk<'_>, announced: Option<[u32; 2]>, canvas: [u32; 2]) -> Result<(), PictureError> {
+    let damaged = |reason: String| Err(PictureError::DamagedImage { format: "WebP", reason });
+    if chunk.name == b"EXIF" && chunk.is_cut {
+        return damaged("an Exif block that ends beyond the file".to_owned());
+    }
+    let Some(found) = lossy_size(chunk.content) else { return Ok(()) };
+    let is_inside = found[0] <= canvas[0] && found[1] <= canvas[1];
+    if is_inside && Some(found) == announced {
+        return Ok(());
+    }
+    let [width, height] = announced.unwrap_or(canvas);
+    damaged(format!("a frame of {} × {} pixels in place of {width} × {height}", found[0], found[1]))
 }
 
 /// The chunks one after the other.
@@ -112,6 +117,7 @@ mod tests {
             (chunk(b"VP8 ", &lossy_frame(16383, 6)), "a frame of 16383 × 6 pixels in place of 8 × 6"),
             (moving(4, 16383), "a frame of 4 × 16383 pixels in place of 4 × 3"),
             (b"EXIF\xff\xff\xff\xff".to_vec(), "an Exif block that ends beyond the file"),
+            (chunk(b"ANMF", &[[0; 16].as_slice(), b"EXIF\xff\xff\xff\xff"].concat()), "an Exif block"),
         ] {
             let error = check_chunks(&file(&[chunk(b"XMP ", &[0; 2]), wrong])).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
