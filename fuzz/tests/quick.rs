@@ -2,6 +2,10 @@
 //! whole process.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::HashSet;
+use std::fs;
+use std::path::Path;
+
 use peak_alloc::PeakAlloc;
 use sdg_fuzz::{TARGETS, costliest_pickles, execute, run};
 
@@ -54,6 +58,13 @@ fn every_reader_refuses_or_reads_and_takes_neither_long_nor_much() {
                 "costly pickle {k}: {} bytes of at most {most}, {:?}",
                 execution.bytes, execution.broken
             ));
+        }
+    }
+    let seeds: HashSet<Vec<u8>> = TARGETS.iter().flat_map(|target| (target.seeds)()).collect();
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus/pictures")).unwrap() {
+        let path = entry.unwrap().path();
+        if !seeds.contains(&fs::read(&path).unwrap()) {
+            wrong.push(format!("expected {} to be a seed", path.display()));
         }
     }
     // The targets' hook records panics without printing them; restore the default hook for the assertion

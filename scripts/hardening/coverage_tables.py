@@ -20,7 +20,7 @@ READERS = [
     ("formats together", ["crates/demonstration/src/draft.rs", "crates/demonstration/src/format.rs",
                           "crates/demonstration/src/foreign.rs"]),
     ("png, jpeg, tiff, webp_bmp_ppm", ["crates/picture/src/" + name for name in
-                                       ["decode.rs", "jpeg.rs", "jpeg_gap.rs", "ppm.rs", "samples.rs", "tiff.rs"]]),
+                                       ["decode.rs", "jpeg.rs", "jpeg_gap.rs", "ppm.rs", "samples.rs", "tiff.rs", "webp.rs"]]),
     ("camera_file", ["crates/calibration/src/camera_file.rs", "crates/calibration/src/camera_sections.rs"]),
     ("robot_poses", ["crates/calibration/src/hand_eye/poses_file.rs"]),
     ("workcell", ["crates/robot/src/workcell/"]),

@@ -191,7 +191,9 @@ pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation])
             push(&object.label, "polygon", &outline.vertices);
         }
         if let (Some(_), Some(width)) = (&object.grasp, object.jaw_width) {
-            let start = shapes.iter_mut().rfind(|shape: &&mut Value| shape["label"] == "grasp_start");
+            // The part itself may have the name of the point.
+            let is_start = |shape: &&mut Value| shape["shape_type"] == "point" && shape["label"] == "grasp_start";
+            let start = shapes.iter_mut().rfind(is_start);
             if let Some(start) = start {
                 start["jaw_width"] = json!(width);
             }
@@ -339,6 +341,20 @@ mod tests {
         assert!(message("[1, 2]").contains("found a list of 2"));
         assert!(message("{\"model\": 3}").contains("an object with `model`"));
         assert!(message("\u{89}PNG").contains("not JSON"));
+    }
+
+    #[test]
+    fn the_jaws_of_a_part_with_the_name_of_the_point_come_back() {
+        let bbox = BoundingBox { x1: 10.0, y1: 20.0, x2: 110.0, y2: 80.0 };
+        let marked = Annotation {
+            label: "grasp_start".into(),
+            bbox,
+            grasp: Some(GraspLine::new(Point2::new(30.0, 50.0), Point2::new(90.0, 50.0))),
+            jaw_width: Some(42.5),
+            outline: Some(Polygon::from_box(&bbox)),
+        };
+        let written = AnnotationFormat::LabelMe.write(&IMAGE, std::slice::from_ref(&marked)).unwrap();
+        assert_eq!(Annotation::read(written.text.as_bytes(), &IMAGE).unwrap(), [marked]);
     }
 
     /// Every marked position. Reading decimal text may change the last bit.

@@ -29,6 +29,9 @@ const MIN_LINE_SHARE: f64 = 0.2;
 const HEIGHT_SHARES: (f64, f64) = (-0.04, 0.18);
 /// Search range across the line, and along it if the part is near the picture's centre; in diagonals.
 const MAX_ASIDE: f64 = 0.04;
+/// Largest shift along the line, in diagonals: reached at 278 diagonals from the photo's or the picture's centre. Chosen
+/// to limit the time with a model whose photo is not the part's.
+const MAX_ALONG: f64 = 50.0;
 /// First step of the search, in diagonals. Chosen to save time.
 const STEP: f64 = 0.01;
 /// Last step of the search, in diagonals. Chosen to save time.
@@ -97,8 +100,10 @@ impl MarksShift {
         // Distances are in diagonals.
         let away = (image_from_cutout.apply(&self.photo_middle) - below_camera) / diagonal;
         let line = away.try_normalize(f64::EPSILON).unwrap_or(Vector2::x());
-        let along_bounds =
-            [(HEIGHT_SHARES.0 * away.norm()).min(-MAX_ASIDE), (HEIGHT_SHARES.1 * away.norm()).max(MAX_ASIDE)];
+        let along_bounds = [
+            (HEIGHT_SHARES.0 * away.norm()).clamp(-MAX_ALONG, -MAX_ASIDE),
+            (HEIGHT_SHARES.1 * away.norm()).clamp(MAX_ASIDE, MAX_ALONG),
+        ];
         let shifted = |[along, across]: [f64; 2]| {
             let shift = diagonal * (along * line + across * Vector2::new(-line.y, line.x));
             image_from_cutout.shifted(shift)

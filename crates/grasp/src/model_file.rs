@@ -23,6 +23,7 @@ use safetensors::{Dtype, SafeTensors};
 use sdg_comparison::ComparisonConfig;
 use sdg_demonstration::{ImageLimits, PictureError, decode_image};
 use sdg_detection::RcnnConfig;
+use sdg_geometry::RotationalSymmetry;
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_orientation::OrientationConfig;
 use serde::Serialize;
@@ -41,6 +42,12 @@ use crate::taught_marks::TaughtMarks;
 
 /// The version that this code writes. It is increased by any change that an older reader would misread.
 pub const FORMAT_VERSION: u32 = 3;
+
+/// Largest distance of a photo's centre from a cut-out's corner along each axis, in pixels of the cut-out: more than the
+/// longest side of any photo.
+const MAX_PHOTO_MIDDLE_PX: f64 = 1e5;
+/// Maximum number of turns of a symmetry: one per degree.
+const MAX_TURNS: u32 = 360;
 
 /// The metadata of a file, without its weights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -130,9 +137,7 @@ impl GraspModel {
         check_count(marks.len())?;
         let mut facts: TeachingFacts = metadata.json("teaching")?;
         let region = facts.region.take();
-        if let Some(lengths) = &facts.lengths {
-            lengths.check()?;
-        }
+        check_values(&facts, &marks)?;
         let mut budget = CutoutBudget::default();
         let demonstrations = marks
             .into_iter()
@@ -162,6 +167,33 @@ impl GraspModel {
         };
         model.with_region(region)
     }
+}
+
+/// Refuses values that teaching cannot give: with them, a search would take all memory or hours.
+fn check_values(facts: &TeachingFacts, marks: &[TaughtMarks]) -> Result<()> {
+    let damaged = |expected: String, found: String| Err(GraspError::Damaged { expected, found });
+    if let Some(lengths) = &facts.lengths {
+        lengths.check()?;
+    }
+    if let RotationalSymmetry::Fold(turns) = facts.symmetry
+        && !(1..=MAX_TURNS).contains(&turns)
+    {
+        return damaged(format!("a symmetry of 1 to {MAX_TURNS} turns"), turns.to_string());
+    }
+    for TaughtMarks { photo_size, photo_middle, .. } in marks {
+        if let Some([width, height]) = photo_size
+            && *width.min(height) == 0
+        {
+            return damaged("a photo with pixels".to_owned(), format!("{width} × {height}"));
+        }
+        if let Some([x, y]) = photo_middle
+            && x.abs().max(y.abs()) > MAX_PHOTO_MIDDLE_PX
+        {
+            let expected = format!("a photo whose centre is at most {MAX_PHOTO_MIDDLE_PX} pixels from the part");
+            return damaged(expected, format!("({x}, {y})"));
+        }
+    }
+    Ok(())
 }
 
 /// The networks of a model of this kind; none for model S.
@@ -342,7 +374,7 @@ mod tests {
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;
-    use sdg_geometry::{BoundingBox, GraspLine, Polygon, RotationalSymmetry};
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
     /// A model of an untaught network, with everything that a file contains.
     fn untaught(kind: ModelKind) -> GraspModel {
@@ -444,6 +476,24 @@ mod tests {
         forged.demonstrations[0].cutout = RgbImage::new(400, 400);
         let refused = refused(&forged);
         assert!(refused.contains("of at most 38976 pixels, according to its marks, found 400 × 400"), "{refused}");
+    }
+
+    #[test]
+    fn values_that_teaching_cannot_give_are_refused() {
+        let message = |change: fn(&mut GraspModel)| {
+            let mut forged = untaught(ModelKind::S);
+            change(&mut forged);
+            refused(&forged)
+        };
+        // The search would resize the cut-out to an infinite size.
+        let photo = message(|model| model.demonstrations[0].marks.photo_size = Some([640, 0]));
+        assert!(photo.contains("a photo with pixels, found 640 × 0"), "{photo}");
+        let middle = message(|model| model.demonstrations[0].marks.photo_middle = Some([20.0, -1e9]));
+        assert!(middle.contains("at most 100000 pixels from the part, found (20, -1000000000)"), "{middle}");
+        let none = message(|model| model.facts.symmetry = RotationalSymmetry::Fold(0));
+        assert!(none.contains("a symmetry of 1 to 360 turns, found 0"), "{none}");
+        let many = message(|model| model.facts.symmetry = RotationalSymmetry::Fold(361));
+        assert!(many.contains("a symmetry of 1 to 360 turns, found 361"), "{many}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::io::Cursor;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage, metadata::Orientation};
 
 use crate::error::PictureError;
-use crate::{jpeg, jpeg_gap, ppm, samples, tiff};
+use crate::{jpeg, jpeg_gap, ppm, samples, tiff, webp};
 
 type Result<T> = std::result::Result<T, PictureError>;
 
@@ -116,6 +116,10 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
             palette = page.palette;
             page.bytes
         }
+        ImageFormat::WebP => {
+            webp::check_chunks(bytes)?;
+            Cow::Borrowed(bytes)
+        }
         _ => Cow::Borrowed(bytes),
     };
     let mut decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().map_err(damaged)?;
@@ -146,6 +150,7 @@ pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
             Ok(page) => page.bytes,
             Err(_) => return false,
         },
+        ImageFormat::WebP if webp::check_chunks(bytes).is_err() => return false,
         _ => Cow::Borrowed(bytes),
     };
     let decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().ok();

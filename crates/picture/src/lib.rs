@@ -24,6 +24,7 @@ mod ppm;
 mod pyramid;
 mod samples;
 mod tiff;
+mod webp;
 
 pub use crop::{CropWindow, OUTSIDE};
 pub use decode::{IMAGE_EXTENSIONS, ImageLimits, PixelFrame, decode_image, decode_image_in, is_turned_by_exif};

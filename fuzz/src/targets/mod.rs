@@ -4,8 +4,11 @@ mod borders;
 mod bytes;
 mod c_border;
 mod cameras;
+mod checkpoints;
 mod fci_server;
+mod jpegs;
 mod marks;
+mod model_files;
 mod models;
 mod numbers;
 mod page;
@@ -13,14 +16,16 @@ mod pictures;
 mod places;
 mod robots;
 mod ros;
+mod ros_seeds;
+mod written_marks;
 
-pub use models::costliest_pickles;
+pub use checkpoints::costliest_pickles;
 
 use crate::target::Target;
 
 /// All targets.
 pub const TARGETS: &[Target] = &[
-    models::CHECKPOINT,
+    checkpoints::CHECKPOINT,
     models::MODEL,
     models::DETECTOR_CONFIG,
     marks::COCO,

@@ -1,6 +1,7 @@
 //! Files with positions of cameras, robots and tables.
 
 use sdg_calibration::{CalibratedCamera, read_robot_poses};
+use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_robot::workcell::Workcell;
 
 use super::bytes::file;
@@ -106,6 +107,33 @@ pub(super) const WORKCELL: Target = Target {
         b"\n",
         b"\"\"\"",
     ],
-    seeds: || vec![file("datasets/workcell/workcell.toml"), file("fuzz/corpus/workcell.toml")],
-    run: |bytes| std::str::from_utf8(bytes).is_ok_and(|text| Workcell::from_toml(text).is_ok()),
+    seeds: || {
+        let shipped = "datasets/workcell/workcell.toml";
+        [shipped, "fuzz/corpus/workcell.toml", "fuzz/corpus/workcell_beside.toml"].map(file).to_vec()
+    },
+    run: |bytes| {
+        let Some(cell) = std::str::from_utf8(bytes).ok().and_then(|text| Workcell::from_toml(text).ok()) else {
+            return false;
+        };
+        use_workcell(&cell);
+        true
+    },
 };
+
+/// Uses a workcell as the program does before a motion.
+fn use_workcell(cell: &Workcell) {
+    let _ = (cell.robot.name(), cell.home(), cell.grasp_config());
+    assert_eq!(cell.safety_limits().workspace, Some(cell.workspace));
+    let model = cell.collision_model(0.5 * HAND_OPENING_MAX_M);
+    assert!(model.is_ok(), "expected obstacles that were checked when they were read, found {:?}", model.err());
+    for place in &cell.places {
+        let last = place.num_cells();
+        for number in [0, 1, last, last + 1] {
+            let goal = cell.place(&format!("{}:{number}", place.name));
+            assert_eq!(goal.is_ok(), (1..=last).contains(&number), "{}:{number} of {last}", place.name);
+        }
+        assert_eq!(cell.place(&place.name).is_ok(), last == 1, "{} of {last} cells", place.name);
+        let _ = place.covers(place.at_m);
+    }
+    let _ = (cell.place("no such place"), cell.place("no such place:one"));
+}

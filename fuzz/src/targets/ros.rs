@@ -1,84 +1,105 @@
 //! Messages of ROS 2.
 
 use sdg_geometry::PinholeCamera;
+use sdg_ros2::cdr::{self, Cdr};
 use sdg_ros2::messages::*;
-use sdg_ros2::{Transforms, camera_info, cdr, encoding, found};
+use sdg_ros2::{Transforms, camera_info, encoding};
 
+use super::ros_seeds::seeds;
 use crate::target::Target;
 
-/// Messages that the node receives, and some that it sends.
+/// Messages that the node receives, and those that it sends.
 pub(super) const CDR: Target = Target {
     name: "ros2",
     max_extra_bytes: 160 << 20,
-    quick_executions: 100_000,
-    dictionary: &[b"\0\x01\0\0", b"rgb8\0", b"bayer_rggb8\0", b"yuv422\0", b"mono16\0", b"\xff\xff\xff\x7f"],
+    quick_executions: 50_000,
+    dictionary: &[
+        b"\0\x01\0\0",
+        b"rgb8\0",
+        b"bayer_rggb8\0",
+        b"yuv422\0",
+        b"mono16\0",
+        b"plumb_bob\0",
+        b"\xff\xff\xff\x7f",
+    ],
     seeds,
-    run: |bytes| read_all(bytes, &mut Transforms::new(0.5)) > 0,
+    run: |bytes| use_as_each(bytes, &mut Transforms::new(0.5)) | is_any_of_the_others(bytes),
 };
 
-/// Reads bytes as each of these messages, and uses the results.
-fn read_all(bytes: &[u8], transforms: &mut Transforms) -> usize {
-    let mut num_read = 0;
-    if let Ok(image) = cdr::from_bytes::<Image>(bytes) {
-        num_read += usize::from(encoding::read_image(&image).is_ok());
-    }
-    if let Ok(image) = cdr::from_bytes::<CompressedImage>(bytes) {
-        num_read += usize::from(encoding::read_compressed(&image).is_ok());
-    }
-    if let Ok(info) = cdr::from_bytes::<CameraInfo>(bytes) {
-        num_read += usize::from(camera_info::read_camera_info(&info).is_ok());
-    }
-    for is_static in [false, true] {
-        if let Ok(message) = cdr::from_bytes::<TfMessage>(bytes) {
-            num_read += 1;
-            transforms.add(&message, is_static);
-            let _ = transforms.lookup("base", "camera", Time { sec: 12, nanosec: 0 });
-        }
-    }
-    num_read += usize::from(cdr::from_bytes::<JointState>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<Detection2DArray>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<DiagnosticArray>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<FollowJointTrajectoryFeedback>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<AfterStatus<FollowJointTrajectoryResult>>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<FollowJointTrajectoryGoal>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<AfterStatus<GripperCommandResult>>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<DetectRequest>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<TeachRequest>(bytes).is_ok());
-    num_read += usize::from(cdr::from_bytes::<GraspRequest>(bytes).is_ok());
-    num_read
+/// Reads a message, writes it and reads that again.
+fn read<T: Cdr>(bytes: &[u8]) -> Option<T> {
+    let message: T = cdr::from_bytes(bytes).ok()?;
+    // Texts end at their first zero, and what follows a message is lost, so that only the second text stays the same.
+    let written = cdr::to_bytes(&message);
+    let again = cdr::from_bytes::<T>(&written).map(|again| cdr::to_bytes(&again));
+    assert!(again.is_ok_and(|again| again == written), "expected a written message to be read unchanged");
+    Some(message)
 }
 
-fn seeds() -> Vec<Vec<u8>> {
-    let header = Header { stamp: Time { sec: 12, nanosec: 34 }, frame_id: "camera".into() };
-    let picture = image::RgbImage::from_fn(12, 9, |x, y| image::Rgb([(x * 20) as u8, (y * 25) as u8, 7]));
-    let pose = nalgebra::Isometry3::translation(0.1, 0.2, 0.3);
-    let transform = |parent: &str, child: &str| {
-        let header = Header { frame_id: parent.into(), ..header.clone() };
-        found::to_transform(&header, child, &pose)
-    };
-    let part = found::FoundPart {
-        name: "rod".into(),
-        score: 0.9,
-        corners: [nalgebra::Point2::new(1.0, 2.0), nalgebra::Point2::new(5.0, 6.0)],
-        grasp: Some((pose, 0.02)),
-    };
-    let names = || vec!["a".to_owned(), "b".to_owned()];
-    let point = JointTrajectoryPoint { positions: vec![0.1, 0.2], ..JointTrajectoryPoint::default() };
-    let trajectory = JointTrajectory { joint_names: names(), points: vec![point.clone(), point], ..Default::default() };
-    let goal = FollowJointTrajectoryGoal { trajectory, ..Default::default() };
-    let diagnostic = DiagnosticStatus { name: "sdg".into(), values: vec![KeyValue::default()], ..Default::default() };
-    vec![
-        cdr::to_bytes(&encoding::to_image(&picture, header.clone())),
-        cdr::to_bytes(&encoding::to_compressed(&picture, header.clone()).expect("a picture is encoded")),
-        cdr::to_bytes(&camera_info::to_camera_info(&PinholeCamera::WRIST, header.clone())),
-        cdr::to_bytes(&TfMessage { transforms: vec![transform("base", "hand"), transform("hand", "camera")] }),
-        cdr::to_bytes(&JointState { name: names(), position: vec![0.0; 2], ..JointState::default() }),
-        cdr::to_bytes(&found::to_detections(&header, &[part.clone(), part])),
-        cdr::to_bytes(&DiagnosticArray { header, status: vec![diagnostic] }),
-        cdr::to_bytes(&goal),
-        cdr::to_bytes(&FollowJointTrajectoryFeedback::default()),
-        cdr::to_bytes(&AfterStatus(FollowJointTrajectoryResult::default())),
-        cdr::to_bytes(&TeachRequest { photo_path: "a.png".into(), ..TeachRequest::default() }),
-        cdr::to_bytes(&DetectRequest::default()),
-    ]
+/// Reads bytes as each message whose content is used, and uses it.
+fn use_as_each(bytes: &[u8], transforms: &mut Transforms) -> bool {
+    let mut is_used = false;
+    if let Some(image) = read::<Image>(bytes) {
+        let picture = encoding::read_image(&image);
+        if let Ok(picture) = &picture {
+            let again = encoding::to_image(picture, image.header);
+            assert!(encoding::read_image(&again).is_ok_and(|again| again == *picture), "a picture after a message");
+        }
+        is_used |= picture.is_ok();
+    }
+    if let Some(image) = read::<CompressedImage>(bytes) {
+        is_used |= encoding::read_compressed(&image).is_ok();
+    }
+    if let Some(info) = read::<CameraInfo>(bytes)
+        && let Ok(camera) = camera_info::read_camera_info(&info)
+    {
+        is_used = true;
+        let _ = camera_info::check_same_camera(&PinholeCamera::WRIST, &camera);
+        let _ = camera_info::read_camera_info(&camera_info::to_camera_info(&camera, info.header));
+    }
+    if let Some(message) = read::<TfMessage>(bytes) {
+        is_used = true;
+        for is_static in [false, true] {
+            transforms.add(&message, is_static);
+            for (target, source) in [("base", "camera"), ("camera", "table"), ("/base", "lidar"), ("no frame", "hand")]
+            {
+                let _ = transforms.lookup(target, source, Time { sec: 12, nanosec: 0 });
+            }
+        }
+    }
+    if let Some(goal) = read::<FollowJointTrajectoryGoal>(bytes) {
+        is_used = true;
+        for point in &goal.trajectory.points {
+            let _ = Duration::from_secs(point.time_from_start.secs());
+        }
+    }
+    if let Some(header) = read::<Header>(bytes)
+        && let Some(time) = header.stamp.to_system()
+    {
+        is_used = true;
+        assert_eq!(Time::from_system(time), header.stamp);
+    }
+    is_used
+}
+
+/// Whether the bytes are any of the messages that are only passed on.
+fn is_any_of_the_others(bytes: &[u8]) -> bool {
+    // This message is empty, so that any bytes are one.
+    let _ = read::<TriggerRequest>(bytes);
+    read::<JointState>(bytes).is_some()
+        | read::<Detection2DArray>(bytes).is_some()
+        | read::<DiagnosticArray>(bytes).is_some()
+        | read::<FollowJointTrajectoryFeedback>(bytes).is_some()
+        | read::<AfterStatus<FollowJointTrajectoryResult>>(bytes).is_some()
+        | read::<GripperCommandGoal>(bytes).is_some()
+        | read::<GripperCommandFeedback>(bytes).is_some()
+        | read::<AfterStatus<GripperCommandResult>>(bytes).is_some()
+        | read::<PoseStamped>(bytes).is_some()
+        | read::<TriggerResponse>(bytes).is_some()
+        | read::<DetectRequest>(bytes).is_some()
+        | read::<DetectResponse>(bytes).is_some()
+        | read::<TeachRequest>(bytes).is_some()
+        | read::<TeachResponse>(bytes).is_some()
+        | read::<GraspRequest>(bytes).is_some()
+        | read::<GraspResponse>(bytes).is_some()
 }
