@@ -90,6 +90,13 @@ export function searchAgain({ compares }) {
     Object.assign(target, { before: compares ? target.detections : null, detections: null, failed: null });
   }
 }
+/** Adopts the models and the region of a session. If another page has changed those in use, the pictures are searched again; after a teaching, its end does this. */
+export function adoptModels({ models, region }) {
+  const used = (from) => JSON.stringify([from.models.find((model) => model.is_current)?.id, from.region]);
+  const isOther = models.length === state.models.length && used({ models, region }) !== used(state);
+  Object.assign(state, { models, region, hasModel: models.some((model) => model.is_current) });
+  if (isOther && !isRunning()) searchAgain({ compares: false });
+}
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

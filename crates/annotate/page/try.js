@@ -12,7 +12,7 @@ import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
 import { isOld, OLD } from "./part_settings.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
-import { changed, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
+import { adoptModels, changed, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { isQuick, progressText, teach } from "./teach.js";
 import { toast } from "./toast.js";
@@ -169,7 +169,7 @@ function teachButton() {
 async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));
-    state.models = (await api.session()).models;
+    adoptModels(await api.session());
     toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "No longer used as a picture without the part.");
   } catch (error) {
     toast(error.message);

@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
 import { button, by, element, shows } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
-import { changed, isRunning, searchAgain, state } from "./store.js";
+import { adoptModels, changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
 import { percent } from "./words.js";
 
@@ -78,8 +78,7 @@ const number = (id) => `Model ${id + 1}`;
 
 async function use(id) {
   try {
-    const session = await api.useModel(id);
-    Object.assign(state, { models: session.models, region: session.region, hasModel: true });
+    adoptModels(await api.useModel(id));
     searchAgain({ compares: false });
     toast("This version is now in use, under the model’s name.");
   } catch (error) {
