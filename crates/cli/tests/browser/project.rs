@@ -463,8 +463,8 @@ fn marks_kept_by_another_tab_stay_until_they_are_saved() {
     page.wait_for("the banner", "return !document.getElementById('lost').hidden");
     page.start_server();
     page.wait_for("saved", "return document.getElementById('saved').innerText === 'Saved in photo.coco.json'");
-    let [before, after] =
-        ["photo.json", "photo.coco.json"].map(|name| annotation(&page.folder.path().join("project").join(name)).bbox.x1);
+    let [before, after] = ["photo.json", "photo.coco.json"]
+        .map(|name| annotation(&page.folder.path().join("project").join(name)).bbox.x1);
     assert!((after - (before - 5.0)).abs() < 0.1, "{before} {after}");
 }
 
