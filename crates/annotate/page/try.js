@@ -126,7 +126,7 @@ async function accept(marks, { correct }) {
       openImage(state.images.length - 1);
       toast("Correct the marks; they are saved as you go.");
     } else if (isQuick()) teach();
-    else toast("Now a demonstration. Teach again to learn from it.");
+    else toast(view.note ?? "Now a demonstration. Teach again to learn from it.");
   } catch (error) {
     toast(error.message);
   }

@@ -194,6 +194,26 @@ fn a_tried_picture_of_another_folder_is_learnt_from_without_writing_there() {
 }
 
 #[test]
+fn a_tried_picture_that_has_marks_keeps_them() {
+    let folder = folder_of(&["rod.png", "other.png"]);
+    std::fs::write(folder.path().join("other.json"), LABELME).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    served.ask("POST", "/api/others/0/try", b"").json();
+    let accept = |served: &Served| served.ask("POST", "/api/trial-pictures/0/accept", b"{}").json();
+    let first = accept(&served);
+    assert_eq!(first["marks"]["box"], json!([40.0, 40.0, 140.0, 60.0]));
+    assert!(first["note"].as_str().is_some() && !served.folder.path().join("other.coco.json").exists(), "{first}");
+    // Also after it was removed, in this session and in a later one.
+    served.ask("PUT", "/api/images/1/marks", MARKS.as_bytes()).json();
+    served.ask("DELETE", "/api/images/1", b"").json();
+    let again = accept(&served);
+    assert_eq!((&again["id"], &again["marks"]["grasp"]["jaw_width"]), (&json!(1), &json!(24.0)));
+    served.ask("DELETE", "/api/images/1", b"").json();
+    let later = accept(&Served::of_photo(served.end(), "rod.png"));
+    assert_eq!(later["marks"], again["marks"]);
+}
+
+#[test]
 fn pictures_of_a_folder_are_in_the_natural_order_of_their_names() {
     let others = folder_of(&["p10.png", "P3.png", "p2.png"]);
     let served = Served::of_photo_and_tried(folder_of(&["rod10.png", "rod9.png", "rod.png"]), "rod.png", others.path());

@@ -12,7 +12,7 @@ use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
 use crate::session_state::{MarkedPicture, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
-use crate::views::{ComparedPicture, ImageView, TrialPictureView, VersionFound};
+use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
 
 /// A query whether learning from a picture would help in other pictures.
 #[derive(Deserialize)]
@@ -188,8 +188,9 @@ impl Session {
         pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
-    /// Makes a tried picture a demonstration with these marks. A picture from the page, or from another folder, is
-    /// copied beside the first picture under an unused name: no marks are written into other folders.
+    /// Makes a tried picture a demonstration with these marks, or with those in its file, which are not written over. A
+    /// picture from the page, or from another folder, is copied beside the first picture under an unused name: no marks
+    /// are written into other folders.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
@@ -215,7 +216,9 @@ impl Session {
         state.trial_pictures[trial_id].became = Some(id);
         state.trial_pictures[trial_id].is_absent = false;
         self.settle_place(&mut state, id)?;
-        state.save(id);
+        if !matches!(state.images[id].saved, Saved::Written { .. }) {
+            state.save(id);
+        }
         state.save_project()?;
         Ok(state.image_view(id))
     }
