@@ -108,6 +108,31 @@ fn a_model_that_another_page_taught_is_adopted() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn pictures_that_cannot_be_compared_are_counted_and_not_called_unchanged() {
+    let page = taught();
+    add(&page, &["cut.png", "whole.png"].map(|name| (name.to_owned(), photo())));
+    patiently(&page, "both", "return document.getElementById('strip').innerText.split('1 found').length === 3");
+    page.click("#tab-teach");
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
+    for number in [1, 2] {
+        page.click(&format!("#version-list li:nth-child({number}) input"));
+        page.settle_frames();
+    }
+    // A compared picture has three cells, another one two.
+    for (name, cells, told) in
+        [("cut.png", 5, "No picture has changed. 1 picture could not be compared."), ("whole.png", 4, "")]
+    {
+        std::fs::write(page.folder.path().join(name), "no picture").unwrap();
+        page.click("#version-list li:nth-child(2) button");
+        let compared = format!("return document.querySelectorAll('#compared td').length === {cells}");
+        patiently(&page, "the table", &compared);
+        assert_eq!(page.text("#compared p"), told);
+    }
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_version_and_a_region_that_another_page_chose_are_adopted() {
     let page = taught();
     page.click("#tab-teach");
