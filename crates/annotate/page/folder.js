@@ -20,8 +20,7 @@ const isWithoutPhoto = () => !state.images.length && !state.camera;
 
 async function refresh() {
   const session = await api.session();
-  const { others, label, is_named: isNamed } = session;
-  Object.assign(state, { others, label, isNamed });
+  Object.assign(state, { others: session.others, label: session.label, isNamed: session.is_named });
   adoptModels(session);
 }
 

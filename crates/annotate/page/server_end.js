@@ -116,7 +116,7 @@ export async function sendKept() {
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
 }
 
-window.addEventListener("pagehide", () => keep());
+window.addEventListener("pagehide", keep);
 
 /** Adopts marks that another page of the session has changed (the next change here would write over them), and its choice of model and region. */
 async function adoptChanges() {
