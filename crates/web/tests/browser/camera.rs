@@ -3,7 +3,7 @@
 use sdg_webdriver::{Browser, Site};
 
 use crate::taught::{Made, demonstration};
-use crate::{SOFTWARE_CARD, assert_quiet, choose, complaint, open_model, open_page, screenshots, site};
+use crate::{SOFTWARE_CARD, assert_quiet, complaint, open_model, open_page, screenshots, site};
 
 /// A page in a browser with a camera and these flags.
 fn with_camera(site: &Site, made: &Made, further: &[&str]) -> Browser {
@@ -50,10 +50,9 @@ fn the_end_of_a_search_by_another_device_is_no_error() {
     browser.find("#camera").unwrap().click().unwrap();
     let status = "return /ms a frame/.test(document.getElementById('status').textContent)";
     browser.wait_for("a frame to be looked at", status).unwrap();
+    browser.run("document.querySelector('#model-facts dl').id = 'before'", &[]).unwrap();
     browser.find("#webgpu").unwrap().click().unwrap();
-    choose(&browser, "#image-files", &[demonstration()]);
-    let done = "return document.querySelector('#pictures small')?.textContent === 'One grasp'";
-    browser.wait_for("the picture to be looked at", done).unwrap();
+    browser.wait_for("the model on the card", "return document.querySelector('#model-facts dl').id === ''").unwrap();
     let complaint = browser.run("return document.getElementById('alert').textContent", &[]).unwrap();
     assert_eq!(complaint, "");
     assert_quiet(&browser);
