@@ -28,8 +28,6 @@ use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView};
 
-/// Maximum number of pictures to try in a session.
-const MAX_TRIAL_PICTURES: usize = 500;
 /// Maximum length of an object's name.
 const MAX_LABEL_CHARS: usize = 80;
 

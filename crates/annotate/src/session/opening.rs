@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use super::{MAX_TRIAL_PICTURES, Session, SessionOptions};
+use super::{Session, SessionOptions};
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
@@ -11,7 +11,9 @@ use crate::model_versions::ModelVersions;
 use crate::names::{absolute, free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project};
+use crate::project_file::{
+    Gone, MAX_TRIAL_PICTURES, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project,
+};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -31,7 +33,7 @@ impl Session {
             (None, None) => None,
         };
         let (project, mut gone) = match &place {
-            Some(place) => ProjectFile::open(place)?,
+            Some(place) => ProjectFile::open(place, options.pixel_frame)?,
             None => (ProjectFile::default(), Gone::default()),
         };
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
@@ -209,12 +211,12 @@ fn trial_pictures(
             if taken {
                 continue;
             }
+            if trial_pictures.len() >= MAX_TRIAL_PICTURES {
+                return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
+            }
             let opened = if is_folder { gone.open(&path, frame) } else { Some(Picture::open(&path, frame)?) };
             trial_pictures.extend(opened.map(|picture| TrialPicture::new(picture, false)));
         }
-    }
-    if trial_pictures.len() > MAX_TRIAL_PICTURES {
-        return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
     }
     Ok(trial_pictures)
 }
