@@ -76,7 +76,7 @@ async function open(session) {
     camera: session.camera,
   });
   adoptModels(session);
-  if (state.images.length) openImage(0);
+  if (state.images.length) openImage(session.shown);
   else showCurrent();
   by("projects").hidden = !session.can_close;
   if (!state.images.length && !state.camera && state.others.length) openFolder("photo");

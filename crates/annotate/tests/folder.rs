@@ -283,6 +283,22 @@ fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
 }
 
 #[test]
+fn a_project_that_is_opened_by_its_second_photo_keeps_its_order_and_its_model() {
+    let served = Served::of_project(folder_of(&["a.png", "b.png"]));
+    for id in 0..2 {
+        served.ask("POST", &format!("/api/others/{id}/photo"), b"").json();
+        served.ask("PUT", &format!("/api/images/{id}/marks"), MARKS.as_bytes()).json();
+    }
+    teach(&served);
+    let served = Served::of_photo(served.end(), "b.png");
+    let again = session(&served);
+    assert_eq!((names(&again["images"]), &again["shown"]), (vec!["a.png", "b.png"], &json!(1)));
+    assert_eq!(again["models"][0]["is_stale"], false);
+    let file = std::fs::read(served.folder.path().join("sdg-project.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&file).unwrap()["photos"], json!(["a.png", "b.png"]));
+}
+
+#[test]
 fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
     let served = Served::of_project(folder_of(&["a.png", "b.png", "c.png"]));
     let first = session(&served);

@@ -71,6 +71,12 @@ impl Session {
             label = label.take().or(named);
             images.push(image);
         }
+        // The first photo is the reference: opening another one changes neither the order nor the model's age.
+        let name = |image: &MarkedPicture| relative(&folder, &image.picture.path);
+        let place_of = |image: &MarkedPicture| project.photos.iter().position(|known| *known == name(image));
+        images.sort_by_key(|image| place_of(image).unwrap_or(usize::MAX));
+        let given = options.images.first();
+        let shown = given.and_then(|(path, _)| images.iter().position(|image| image.picture.path == *path));
         let trial_pictures = trial_pictures(&project, &folder, &images, options, &mut gone)?;
         let mut notes = std::mem::take(&mut gone.notes);
         let temporary = match place {
@@ -146,6 +152,7 @@ impl Session {
             temporary,
             locks: Mutex::default(),
             state: Arc::new(Mutex::new(state)),
+            shown: shown.unwrap_or(0),
             id: new_token()?,
             token: options.token.clone(),
             notes,
