@@ -229,6 +229,7 @@ fn a_tried_picture_that_has_marks_keeps_them() {
     let folder = folder_of(&["rod.png", "other.png"]);
     std::fs::write(folder.path().join("other.json"), LABELME).unwrap();
     let served = Served::of_photo(folder, "rod.png");
+    assert_eq!(names(&session(&served)["others"]), ["other.png"]);
     served.ask("POST", "/api/others/0/try", b"").json();
     let accept = |served: &Served| served.ask("POST", "/api/trial-pictures/0/accept", b"{}").json();
     let first = accept(&served);
@@ -285,6 +286,7 @@ fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
 #[test]
 fn a_project_that_is_opened_by_its_second_photo_keeps_its_order_and_its_model() {
     let served = Served::of_project(folder_of(&["a.png", "b.png"]));
+    assert_eq!(names(&session(&served)["others"]), ["a.png", "b.png"]);
     for id in 0..2 {
         served.ask("POST", &format!("/api/others/{id}/photo"), b"").json();
         served.ask("PUT", &format!("/api/images/{id}/marks"), MARKS.as_bytes()).json();
