@@ -8,7 +8,8 @@
 //! ```
 //!
 //! If the user gives a file in another folder for the model, `models/` is there, too; both folders may be moved. A
-//! version is only read and copied, never changed or deleted, so a path in a project's file from elsewhere does no harm.
+//! version is only read and copied, never changed or deleted, so a path in a project's file from elsewhere does no
+//! harm.
 
 use std::fs;
 use std::path::{Path, PathBuf};

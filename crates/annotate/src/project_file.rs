@@ -285,8 +285,8 @@ impl ProjectFile {
         if self.tried.len() > most {
             let count = self.tried.split_off(most).len();
             gone.notes.push(format!(
-                "Pictures of this folder that are left out, because at most {most} can be tried: {count}. “From this folder” \
-                 offers them."
+                "Pictures of this folder that are left out, because at most {most} can be tried: {count}. “From this \
+                 folder” offers them."
             ));
         }
         Ok(())

@@ -88,8 +88,8 @@ impl State {
         self.trial_pictures[trial_id].became.filter(|&id| !self.images[id].is_removed)
     }
 
-    /// Adds a picture, or restores it if it was removed, and returns its number. Marks that it has already are kept: the
-    /// given ones are used only if there are none, and are not saved yet.
+    /// Adds a picture, or restores it if it was removed, and returns its number. Marks that it has already are kept:
+    /// the given ones are used only if there are none, and are not saved yet.
     ///
     /// # Errors
     /// The picture is a photo already, the file beside it contains no marks of it or belongs to another photo, or an
