@@ -243,35 +243,42 @@ def test_trackers(shape_model: sdg.GraspModel) -> None:
 
 
 FORKED = """
-import os, sys
+import os, signal, sys
 import sdg
 model, picture = sdg.GraspModel.load(sys.argv[1]), sdg.read_picture(sys.argv[2])
 
-def in_a_fork(threads):
+def in_a_fork(work):
     if os.fork() == 0:
+        # A process that waits for threads which do not exist is ended.
+        signal.alarm(60)
         try:
-            print("found", len(model.detect(picture, threads=threads)), flush=True)
+            print("found", len(work()), flush=True)
         except sdg.ForkedError as error:
             print(error, flush=True)
         os._exit(0)
     os.wait()
 
+def detect(threads):
+    in_a_fork(lambda: model.detect(picture, threads=threads))
+
 # Loading takes one thread per core, so that other threads can be made in a fork.
-in_a_fork(None)
-in_a_fork(1)
+detect(None)
+detect(1)
+in_a_fork(lambda: [sdg.teach(sys.argv[2], sys.argv[3], model="S")])
 model.detect(picture)
-in_a_fork(None)
-in_a_fork(1)
+detect(None)
+detect(1)
 """
 
 
 def test_a_forked_process_is_told_instead_of_waiting_for_ever(models: dict[str, Path]) -> None:
-    arguments = [sys.executable, "-c", FORKED, str(models["S"]), str(made_pictures.PHOTO)]
+    files = [models["S"], made_pictures.PHOTO, made_pictures.MARKS]
+    arguments = [sys.executable, "-c", FORKED, *map(str, files)]
     done = subprocess.run(arguments, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[1] == "found 1", lines
-    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3)), lines
+    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3, 4)), lines
 
 
 def test_every_exception_is_of_this_package() -> None:

@@ -1,7 +1,7 @@
 // Differences between the grasps that two models accept in the same picture.
 
 import { gripperOf, norm, sub, times } from "./geometry.js";
-import { listText } from "./words.js";
+import { listText, pictures } from "./words.js";
 
 /** A hand turned by more than this is another grasp. */
 const MAX_TURN = (20 * Math.PI) / 180;
@@ -34,10 +34,10 @@ export function changeOf(before, after, turns) {
 }
 
 /** The changes of several pictures, `{ name, change }`, in words. */
-export function changesText(pictures) {
+export function changesText(changes) {
   const sentences = Object.entries(WORDS).map(([kind, words]) => {
-    const names = pictures.filter(({ change }) => change === kind).map(({ name }) => name);
-    return names.length ? `In ${names.length} picture${names.length === 1 ? "" : "s"} ${words}: ${listText(names, MAX_NAMES)}.` : "";
+    const names = changes.filter(({ change }) => change === kind).map(({ name }) => name);
+    return names.length ? `In ${pictures(names.length)} ${words}: ${listText(names, MAX_NAMES)}.` : "";
   });
   return sentences.filter(Boolean).join(" ") || "No picture has changed.";
 }

@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
 import { button, by, element } from "./elements.js";
-import { changed, isLive, state } from "./store.js";
+import { adoptModels, changed, isLive, state } from "./store.js";
 import { openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
@@ -19,8 +19,9 @@ const offered = (role) => state.others.filter(({ is_tried: isTried }) => role ==
 const isWithoutPhoto = () => !state.images.length && !state.camera;
 
 async function refresh() {
-  const { others, label, is_named: isNamed, models } = await api.session();
-  Object.assign(state, { others, label, isNamed, models });
+  const session = await api.session();
+  Object.assign(state, { others: session.others, label: session.label, isNamed: session.is_named });
+  adoptModels(session);
 }
 
 function took(view) {

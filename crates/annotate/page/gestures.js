@@ -270,7 +270,7 @@ overlay.addEventListener("pointermove", (event) => {
   if (pointers.size === 2) {
     const [other] = [...pointers].filter(([id]) => id !== event.pointerId).map(([, p]) => p);
     const before = norm(sub(known, other));
-    if (before > 0) zoom(norm(sub(at, other)) / before, other);
+    if (before > 0) zoom(norm(sub(at, other)) / before, times(add(known, other), 0.5));
     pan(times(sub(add(at, other), add(known, other)), 0.5));
   } else if (gesture) {
     gesture.moved ||= norm(sub(at, gesture.from)) > CLICK_PX;
@@ -289,12 +289,12 @@ function up(event) {
 overlay.addEventListener("pointerup", up);
 overlay.addEventListener("pointercancel", up);
 
-/** Restores the marks from before the gesture. */
-export function abandon() {
+/** Restores the marks from before the gesture; an unclosed outline keeps its points. */
+function abandon() {
   gesture = null;
   stage.classList.remove("panning");
   if (image()) image().marks = JSON.parse(image().committed);
-  state.draft = null;
+  if (state.draft?.kind !== "outline") state.draft = null;
   changed();
 }
 
@@ -320,7 +320,10 @@ export function holdSpace(held) {
 /** Cancels the current drawing; otherwise clears the selection. */
 export function letGo() {
   abandonRegion();
-  if (gesture || state.draft) return abandon();
+  if (gesture || state.draft) {
+    state.draft = null;
+    return abandon();
+  }
   Object.assign(state, { selected: null, vertex: null });
   setTool("select");
   overlay.focus({ preventScroll: true });

@@ -5,7 +5,7 @@
 
 import { api } from "./api.js";
 import { button, by, shows } from "./elements.js";
-import { isFound, isLive, isWaiting, state, trialPicture } from "./store.js";
+import { currentModel, isFound, isLive, isWaiting, state, trialPicture } from "./store.js";
 import { openTrialPicture } from "./strip.js";
 import { isQuick, teachRequest } from "./teach.js";
 
@@ -26,8 +26,7 @@ function question() {
   const refused = trialPictures.filter((t) => t.detections && t.became === null && !t.is_absent && !t.detections.some(isFound));
   const candidates = refused.filter((t) => best(t) >= MIN_LIKE).sort((a, b) => best(b) - best(a)).slice(0, MAX_CANDIDATES);
   if (!candidates.length || refused.length < 2) return null;
-  const model = state.models.find(({ is_current }) => is_current).id;
-  const key = JSON.stringify([model, candidates.map(({ id }) => id), refused.map(({ id }) => id)]);
+  const key = JSON.stringify([currentModel().id, candidates.map(({ id }) => id), refused.map(({ id }) => id)]);
   return { key, candidates, refused };
 }
 

@@ -13,7 +13,7 @@ import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";
 import { beat, renderUnsaved, sendKept } from "./server_end.js";
 import { showStart } from "./start.js";
-import { onChange, state } from "./store.js";
+import { adoptModels, onChange, state } from "./store.js";
 import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
 import { renderTeach, watch } from "./teach.js";
@@ -69,16 +69,14 @@ async function open(session) {
     others: session.others,
     modelPath: session.model_path,
     project: session.project,
-    models: session.models,
-    region: session.region,
     isCalibrated: session.is_calibrated,
-    hasModel: session.models.some((model) => model.is_current),
     images: session.images.map(adopt),
     trialPictures: session.trial_pictures.map((trial) => ({ ...trial, detections: null })),
     teaching,
     camera: session.camera,
   });
-  if (state.images.length) openImage(0);
+  adoptModels(session);
+  if (state.images.length) openImage(session.shown);
   else showCurrent();
   by("projects").hidden = !session.can_close;
   if (!state.images.length && !state.camera && state.others.length) openFolder("photo");

@@ -4,7 +4,7 @@
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, adoptChange, save, textOf } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
-import { changed, state } from "./store.js";
+import { adoptModels, changed, state } from "./store.js";
 import { showCurrent } from "./strip.js";
 import { follow } from "./teach.js";
 import { toast } from "./toast.js";
@@ -19,11 +19,18 @@ const keptKey = () => `kept-marks:${state.project}`;
 
 const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
 
-/** Stores marks that the server has not received, by the photo's name. */
+/** The waiting marks by the photo's name, of all tabs, and the names of those that this tab has stored. */
+const kept = () => JSON.parse(stored(keptKey()) ?? "{}");
+let own = [];
+
+/** Stores marks that the server has not received, in place of those that this tab has stored before. */
 function keep() {
-  const kept = {};
-  for (const target of state.images.filter(isUnsaved)) kept[target.name] = { was: target.sent, marks: target.marks };
-  if (Object.keys(kept).length) stored(keptKey(), JSON.stringify(kept));
+  const all = kept();
+  for (const name of own) delete all[name];
+  const unsaved = state.images.filter(isUnsaved);
+  own = unsaved.map(({ name }) => name);
+  for (const { name, sent, marks } of unsaved) all[name] = { was: sent, marks };
+  stored(keptKey(), Object.keys(all).length ? JSON.stringify(all) : null);
 }
 
 onLoss((lost) => {
@@ -78,26 +85,26 @@ async function meetAgain() {
   Object.assign(state, {
     images: [...images, ...newImages.map(adopt)],
     trialPictures: [...trials, ...newTrials.map((view) => ({ ...view, detections: null }))],
-    models: session.models,
-    hasModel: session.models.some((model) => model.is_current),
   });
+  adoptModels(session);
   state.current = Math.max(state.images.indexOf(shown), 0);
   state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
   belongTo(session);
   setLost(false);
+  sendKept();
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
   if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
   if (state.images[state.current] !== shown || state.trialPictures[state.trial] !== tried) showCurrent();
   changed();
 }
 
-/** Sends this project's marks that were stored when the page was closed or reloaded without a server. */
+/** Sends this project's marks that were stored when the page, here or in another tab, was closed or reloaded without a server. */
 export async function sendKept() {
-  const text = stored(keptKey());
+  const all = kept();
   stored(keptKey(), null);
-  if (!text) return;
+  own = [];
   const sent = [];
-  for (const [name, { was, marks }] of Object.entries(JSON.parse(text))) {
+  for (const [name, { was, marks }] of Object.entries(all)) {
     const target = state.images.find((image) => image.name === name);
     // Marks changed elsewhere since then are not overwritten.
     if (!target || textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
@@ -109,16 +116,18 @@ export async function sendKept() {
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
 }
 
-window.addEventListener("pagehide", () => keep());
+window.addEventListener("pagehide", keep);
 
-/** Adopts marks that another page of the session has changed; the next change here would write over them. */
+/** Adopts marks that another page of the session has changed (the next change here would write over them), and its choice of model and region. */
 async function adoptChanges() {
   if (isLost() || document.hidden) return;
   const before = state.images.map((target) => [target, target.revision]);
   // If the server is gone, a banner says so.
   const session = await api.session().catch(() => null);
+  if (!session) return;
+  adoptModels(session);
   for (const [target, revision] of before) {
-    const view = session?.images.find(({ id }) => id === target.id);
+    const view = session.images.find(({ id }) => id === target.id);
     if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
   }
   changed();
@@ -142,11 +151,9 @@ export function renderUnsaved() {
 export async function beat() {
   for (;;) {
     await wait(isLost() ? RETRY_MS : BEAT_MS);
-    if (isLost()) {
-      keep();
-      await meetAgain();
-    } else {
-      if (!state.images.some(isUnsaved)) stored(keptKey(), null);
+    keep();
+    if (isLost()) await meetAgain();
+    else {
       state.images.filter(({ saved }) => saved.by_disk).forEach(save);
       if (!document.hidden) await api.teaching().then(follow, () => null);
     }

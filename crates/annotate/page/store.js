@@ -90,6 +90,18 @@ export function searchAgain({ compares }) {
     Object.assign(target, { before: compares ? target.detections : null, detections: null, failed: null });
   }
 }
+
+/** The model in use: the page's, or that of a session. */
+export const currentModel = ({ models } = state) => models.find((model) => model.is_current);
+
+/** Adopts the models and the region of a session. If another page has changed those in use, the pictures are searched again; after a teaching, its end does this. */
+export function adoptModels({ models, region }) {
+  const used = (from) => JSON.stringify([currentModel(from)?.id, from.region]);
+  const isOther = models.length === state.models.length && used({ models, region }) !== used(state);
+  Object.assign(state, { models, region, hasModel: Boolean(currentModel({ models })) });
+  if (isOther && !isRunning()) searchAgain({ compares: false });
+}
+
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

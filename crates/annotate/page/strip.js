@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { nextTool } from "./editing.js";
 import { by, element } from "./elements.js";
 import { toast } from "./toast.js";
-import { changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
+import { adoptModels, changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
 import { replacePicture, show } from "./view.js";
 
 const strip = by("strip");
@@ -37,7 +37,7 @@ export function openNext(step) {
 /** Adopts the server's view of the pictures to try and of the models, after a picture was removed or restored. */
 function adoptSession(session) {
   for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
-  state.models = session.models;
+  adoptModels(session);
 }
 
 /** Removes a photo or a picture to try from the session; its file is kept, and it can be restored. */

@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { by, wait } from "./elements.js";
 import { isMarked, showCurrent } from "./strip.js";
-import { changed, isLive, state } from "./store.js";
+import { adoptModels, changed, isLive, state } from "./store.js";
 
 const NAMES = ["mark", "samples", "teach", "try"];
 const tab = (name) => by(`tab-${name}`);
@@ -24,7 +24,7 @@ async function refreshVersions() {
   try {
     // Marks that are being sent come first.
     while (state.images.some((photo) => photo.saving)) await wait(50);
-    state.models = (await api.session()).models;
+    adoptModels(await api.session());
     changed();
   } catch {
     // The banner says that the server is gone.

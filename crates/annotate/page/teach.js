@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { by, element, offBecause, setText, wait } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
-import { changed, image, isComplete, isRunning, searchAgain, state } from "./store.js";
+import { changed, currentModel, image, isComplete, isRunning, searchAgain, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
@@ -45,7 +45,7 @@ for (const [letter, name, says] of MODELS) {
 }
 
 /** Whether the model in use is taught in seconds: it then learns at once from confirmed detections. */
-export const isQuick = () => state.models.find((model) => model.is_current)?.summary.model === "S" && !isRunning();
+export const isQuick = () => currentModel()?.summary.model === "S" && !isRunning();
 
 by("teach-form").addEventListener("submit", (event) => {
   event.preventDefault();
@@ -207,7 +207,7 @@ by("teach-form").addEventListener("change", changed);
 /** Whether the model in use and its settings of the part were selected in the form. */
 let preselected = false;
 function preselect() {
-  const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);
+  const last = currentModel() ?? state.models.at(-1);
   if (preselected || !last) return;
   preselected = true;
   for (const [name, value] of [["model", last.summary.model], ["symmetry", last.symmetry]]) {

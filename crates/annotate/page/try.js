@@ -12,7 +12,7 @@ import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
 import { isOld, OLD } from "./part_settings.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
-import { changed, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
+import { adoptModels, changed, currentModel, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { isQuick, progressText, teach } from "./teach.js";
 import { toast } from "./toast.js";
@@ -24,7 +24,6 @@ const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** With fewer pictures the order does not matter. */
 const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
-const currentModel = () => state.models.find((model) => model.is_current);
 
 by("add-pictures").addEventListener("click", () => by("picture-input").click());
 by("add-folder").addEventListener("click", () => by("folder-input").click());
@@ -126,7 +125,7 @@ async function accept(marks, { correct }) {
       openImage(state.images.length - 1);
       toast("Correct the marks; they are saved as you go.");
     } else if (isQuick()) teach();
-    else toast("Now a demonstration. Teach again to learn from it.");
+    else toast(view.note ?? "Now a demonstration. Teach again to learn from it.");
   } catch (error) {
     toast(error.message);
   }
@@ -169,7 +168,7 @@ function teachButton() {
 async function setAbsent(target, absent) {
   try {
     Object.assign(target, await api.setAbsent(target.id, absent));
-    state.models = (await api.session()).models;
+    adoptModels(await api.session());
     toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "No longer used as a picture without the part.");
   } catch (error) {
     toast(error.message);

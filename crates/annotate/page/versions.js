@@ -4,9 +4,9 @@ import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
 import { button, by, element, shows } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
-import { changed, isRunning, searchAgain, state } from "./store.js";
+import { adoptModels, changed, isRunning, searchAgain, state } from "./store.js";
 import { toast } from "./toast.js";
-import { percent } from "./words.js";
+import { percent, pictures } from "./words.js";
 
 const list = by("version-list");
 /** A model whose found share is lower by this or more is worse. */
@@ -30,7 +30,7 @@ export function figuresText({ figures, negatives }) {
   const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees, others_in_photo: others } = figures;
   const off = error ? `, off by ${error[0].toFixed(1)}\u00a0${error[1]} and ${degrees.toFixed(1)}° (median)` : "";
   const more = others ? ` ${others} further parts in the photo were removed from the samples.` : "";
-  const said = negatives ? ` It refuses ${negatives.refused} of your ${negatives.pictures} picture${negatives.pictures === 1 ? "" : "s"} without the part.` : "";
+  const said = negatives ? ` It refuses ${negatives.refused} of your ${pictures(negatives.pictures)} without the part.` : "";
   return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0% interval: ${Math.round(100 * low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]}.${more}${said}`;
 }
 
@@ -78,8 +78,7 @@ const number = (id) => `Model ${id + 1}`;
 
 async function use(id) {
   try {
-    const session = await api.useModel(id);
-    Object.assign(state, { models: session.models, region: session.region, hasModel: true });
+    adoptModels(await api.useModel(id));
     searchAgain({ compares: false });
     toast("This version is now in use, under the model’s name.");
   } catch (error) {
@@ -99,8 +98,11 @@ async function compare() {
     if (!rows.length) out.textContent = "There is no picture to try yet: add some in the last step.";
     else {
       const turns = state.models[Math.max(...pair)].symmetry ?? 1;
-      for (const row of rows) row.change = row.found && changeOf(...row.found.map(({ accepted }) => accepted), turns);
-      out.replaceChildren(element("p", { textContent: changesText(rows) }), table(rows, pair));
+      const known = rows.filter(({ found }) => found);
+      for (const row of known) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
+      const failed = rows.length - known.length;
+      const text = known.length ? changesText(known) + (failed ? ` ${pictures(failed)} could not be compared.` : "") : "";
+      out.replaceChildren(element("p", { textContent: text }), table(rows, pair));
     }
   } catch (error) {
     if (pair === compared) out.textContent = error.message;

@@ -3,6 +3,8 @@
 export const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 export const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
 
+export const pictures = (count) => `${count} picture${count === 1 ? "" : "s"}`;
+
 /** At most `most` of the words as a list, and the number of the others. */
 export function listText(words, most = Infinity) {
   const more = words.length - most;

@@ -94,9 +94,12 @@ impl Newest {
                 true
             }
             Err(error) => {
+                let is_of_folder = matches!(&error, CameraError::Fault { camera, .. } if camera.starts_with("dir:"));
                 let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < MAX_TORN_AGE);
                 match error.fault() {
                     Some(Fault::Torn { .. }) if is_recent => {}
+                    // With `follow`, the newest file is the newest picture until there is another, however late.
+                    Some(Fault::Stale { .. }) if is_of_folder => {}
                     Some(passing) => self.fault = live_fault(passing),
                     None => self.fault = fault(LiveFaultKind::Failed, error.to_string()),
                 }
@@ -138,9 +141,12 @@ mod tests {
     use super::*;
     use image::Rgb;
 
+    const STALL_TIMEOUT: Duration = Duration::from_millis(50);
+
     fn open(address: &str) -> (CameraPictures, String) {
         let address = paced(address.parse().unwrap());
-        let camera = sdg_camera::open(&address, &sdg_camera::OpenOptions::default()).unwrap();
+        let options = sdg_camera::OpenOptions { stall_timeout: STALL_TIMEOUT, ..sdg_camera::OpenOptions::default() };
+        let camera = sdg_camera::open(&address, &options).unwrap();
         (CameraPictures::read(camera, false, None), address.to_string())
     }
 
@@ -206,5 +212,14 @@ mod tests {
         }
         assert!(begun.elapsed() >= 2 * FILES_INTERVAL);
         assert_eq!(*camera.newest().frame.unwrap().picture, picture(7));
+
+        // While a followed folder gets no new file, its newest picture stays usable.
+        let (followed, _) = open(&format!("dir:{}?follow", folder.path().display()));
+        while number(&followed).is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(60));
+            thread::sleep(Duration::from_millis(5));
+        }
+        thread::sleep(10 * STALL_TIMEOUT);
+        assert_eq!(followed.newest().fault, None);
     }
 }

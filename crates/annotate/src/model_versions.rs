@@ -7,8 +7,9 @@
 //! models/pendulum-20261120-081500.sdg    the former pendulum.sdg, if no teaching here made it
 //! ```
 //!
-//! If the user gives a file in another folder for the model, `models/` is there, too. A version is only read and copied,
-//! never changed or deleted, so a path in a project's file from elsewhere does no harm.
+//! If the user gives a file in another folder for the model, `models/` is there, too; both folders may be moved. A
+//! version is only read and copied, never changed or deleted, so a path in a project's file from elsewhere does no
+//! harm.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::names::{free_numbered, relative};
+use crate::names::{absolute, free_numbered, relative};
 use crate::teacher::TaughtSummary;
 
 /// Maximum size of a model file.
@@ -27,7 +28,8 @@ const MAX_MODEL_BYTES: u64 = 1 << 30;
 /// The model of one teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Version {
-    /// File name in the project's folder of versions; the absolute path of a file elsewhere.
+    /// File name in the project's folder of versions; for a file elsewhere, its path in the project's folder, or its
+    /// absolute path.
     pub file: String,
     /// Time of the teaching: seconds since 1970.
     pub taught_secs: u64,
@@ -79,9 +81,17 @@ impl ModelVersions {
     }
 
     fn path(&self, version: &Version) -> PathBuf {
-        let path = self.default_folder.join(&version.file);
-        // Earlier programs gave no path of a file elsewhere.
-        if path.exists() { path } else { self.folder.join(&version.file) }
+        let file = Path::new(&version.file);
+        let name = file.file_name().unwrap_or_default();
+        // Earlier programs gave no path of a file elsewhere. Only the name is known of a file that was moved.
+        let paths = [self.default_folder.join(file), self.project().join(file), self.folder.join(name)];
+        let [first, ..] = &paths;
+        paths.iter().find(|path| path.exists()).unwrap_or(first).clone()
+    }
+
+    /// The absolute path of the project's folder.
+    fn project(&self) -> PathBuf {
+        absolute(&self.default_folder).parent().map(Path::to_owned).unwrap_or_default()
     }
 
     /// Writes a new version under its own name and makes it the one in use, at `path`.
@@ -95,7 +105,11 @@ impl ModelVersions {
         let file = free_numbered(&self.folder.join(name));
         write_atomically(&file, bytes)?;
         write_atomically(path, bytes)?;
-        self.versions.push(Version { file: relative(&self.default_folder, &file), ..version });
+        let file = match file.strip_prefix(&self.default_folder) {
+            Ok(name) => name.to_string_lossy().into_owned(),
+            Err(_) => relative(&self.project(), &absolute(&file)),
+        };
+        self.versions.push(Version { file, ..version });
         self.current = Some(self.versions.len() - 1);
         Ok(())
     }

@@ -31,6 +31,8 @@ use crate::region::Region;
 
 /// Folder of pictures added on the page.
 pub const TRIED_FOLDER: &str = "tried";
+/// Maximum number of pictures to try.
+pub const MAX_TRIAL_PICTURES: usize = 500;
 const FORMAT: u32 = 1;
 /// Maximum size of a project's file.
 const MAX_BYTES: u64 = 64 << 20;
@@ -162,7 +164,7 @@ pub struct Gone {
     pub photos: Vec<String>,
     pub tried: Vec<Tried>,
     /// A sentence for the user about each picture that is left out: these, and unreadable ones that were added to the
-    /// folder.
+    /// folder; and one about those beyond the maximum number.
     pub notes: Vec<String>,
 }
 
@@ -219,11 +221,11 @@ impl ProjectFile {
     }
 
     /// Reads a project's file and, for a folder, adds pictures that were added later. Missing pictures are removed and
-    /// returned separately; unreadable ones are not added.
+    /// returned separately; unreadable ones, and those beyond the maximum number of pictures to try, are not added.
     ///
     /// # Errors
     /// The folder cannot be read, the file is not a project's file, or marks belong to another picture.
-    pub fn open(place: &ProjectPlace) -> Result<(Self, Gone)> {
+    pub fn open(place: &ProjectPlace, frame: PixelFrame) -> Result<(Self, Gone)> {
         let read = Self::read(place)?;
         let is_new = read.is_none();
         let mut file = read.unwrap_or_default();
@@ -239,7 +241,7 @@ impl ProjectFile {
             file.current_model = None;
         }
         if place.is_folder {
-            file.add_new(folder, is_new, &mut gone)?;
+            file.add_new(folder, is_new, frame, &mut gone)?;
             // A missing photo may come back; until then, no picture replaces it.
             if gone.photos.is_empty() {
                 file.choose_only_photo();
@@ -258,7 +260,8 @@ impl ProjectFile {
         self.tried.extend(tried);
     }
 
-    fn add_new(&mut self, folder: &Path, is_new: bool, gone: &mut Gone) -> Result<()> {
+    fn add_new(&mut self, folder: &Path, is_new: bool, frame: PixelFrame, gone: &mut Gone) -> Result<()> {
+        let most = MAX_TRIAL_PICTURES.max(self.tried.len());
         for path in pictures_in(folder)? {
             let name = relative(folder, &path);
             let is_known = self.photos.contains(&name)
@@ -267,8 +270,7 @@ impl ProjectFile {
             if is_known {
                 continue;
             }
-            // The frame matters only for rotated pictures, which a session with a calibrated camera refuses as photos.
-            let Some(picture) = gone.open(&path, PixelFrame::Upright) else { continue };
+            let Some(picture) = gone.open(&path, frame) else { continue };
             let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
             if is_marked {
                 self.photos.push(name);
@@ -279,6 +281,13 @@ impl ProjectFile {
         if is_new && self.photos.is_empty() && self.tried.len() > 1 {
             // Only the user knows which of them is the photo; until it is chosen, none is added.
             self.removed.extend(self.tried.drain(..).map(|tried| tried.file));
+        }
+        if self.tried.len() > most {
+            let count = self.tried.split_off(most).len();
+            gone.notes.push(format!(
+                "Pictures of this folder that are left out, because at most {most} can be tried: {count}. “From this \
+                 folder” offers them."
+            ));
         }
         Ok(())
     }
@@ -321,7 +330,7 @@ mod tests {
     use image::RgbImage;
 
     fn open(folder: &Path) -> (ProjectFile, Vec<String>) {
-        let (file, gone) = ProjectFile::open(&ProjectPlace::of_folder(folder)).unwrap();
+        let (file, gone) = ProjectFile::open(&ProjectPlace::of_folder(folder), PixelFrame::Upright).unwrap();
         let tried = gone.tried.into_iter().map(|tried| tried.file);
         (file, gone.photos.into_iter().chain(tried).collect())
     }
@@ -367,18 +376,19 @@ mod tests {
         let place = ProjectPlace::of_photo(&at("a.png")).unwrap();
         assert_eq!(place.file, at("a.sdg-project.json"));
         // No other file of the folder is added, and a photo alone needs no project's file.
-        assert_eq!(ProjectFile::open(&place).unwrap().0, ProjectFile::default());
+        let open = |place: &ProjectPlace| ProjectFile::open(place, PixelFrame::Upright).unwrap().0;
+        assert_eq!(open(&place), ProjectFile::default());
         let bare = ProjectFile { photos: vec!["a.png".into()], ..ProjectFile::default() };
         bare.write(&place).unwrap();
         assert!(!place.file.exists());
         let named = ProjectFile { label: Some("rod".into()), ..bare };
         named.write(&place).unwrap();
-        assert_eq!(ProjectFile::open(&place).unwrap().0, named);
+        assert_eq!(open(&place), named);
 
         let whole = ProjectFile { photos: vec!["b.png".into()], ..ProjectFile::default() };
         whole.write(&ProjectPlace::of_folder(folder.path())).unwrap();
         let place = ProjectPlace::of_photo(&at("b.png")).unwrap();
-        assert_eq!((place.file.clone(), ProjectFile::open(&place).unwrap().0), (at(PROJECT_FILE), whole));
+        assert_eq!((place.file.clone(), open(&place)), (at(PROJECT_FILE), whole));
         assert_eq!(ProjectPlace::of_photo(&at("a.png")).unwrap().file, at("a.sdg-project.json"));
     }
 
@@ -403,7 +413,7 @@ mod tests {
         ] {
             fs::write(folder.path().join(PROJECT_FILE), text).unwrap();
             let place = ProjectPlace::of_folder(folder.path());
-            let error = ProjectFile::open(&place).unwrap_err().to_string();
+            let error = ProjectFile::open(&place, PixelFrame::Upright).unwrap_err().to_string();
             assert!(error.contains(found), "{error}");
         }
     }

@@ -28,8 +28,6 @@ use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView};
 
-/// Maximum number of pictures to try in a session.
-const MAX_TRIAL_PICTURES: usize = 500;
 /// Maximum length of an object's name.
 const MAX_LABEL_CHARS: usize = 80;
 
@@ -98,6 +96,8 @@ pub struct Session {
     /// Locks that keep other programs from writing the same files.
     locks: Mutex<Vec<WriterLock>>,
     state: Arc<Mutex<State>>,
+    /// Number of the photo that was opened.
+    shown: usize,
     id: String,
     token: Option<String>,
     notes: Vec<String>,
@@ -144,6 +144,7 @@ impl Session {
             is_named: state.is_named,
             others,
             images: state.image_ids().map(|id| state.image_view(id)).collect(),
+            shown: state.image_ids().position(|id| id == self.shown).unwrap_or(0),
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
             models: state.model_views(),

@@ -88,17 +88,34 @@ impl State {
         self.trial_pictures[trial_id].became.filter(|&id| !self.images[id].is_removed)
     }
 
-    /// Adds a picture with unsaved marks and returns its number.
+    /// Adds a picture, or restores it if it was removed, and returns its number. Marks that it has already are kept:
+    /// the given ones are used only if there are none, and are not saved yet.
     ///
     /// # Errors
-    /// The file beside it contains no marks of it, or belongs to another photo.
+    /// The picture is a photo already, the file beside it contains no marks of it or belongs to another photo, or an
+    /// Exif orientation rotates a photo of a calibrated camera.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
-        let opened = annotation_file::open(&picture.path, None, picture.size)?;
-        let (file, note) = (opened.path, opened.note);
-        let image = MarkedPicture { file, note, ..MarkedPicture::unsaved(picture, marks) };
+        let path = absolute(&picture.path);
+        let known = self.images.iter().position(|image| absolute(&image.picture.path) == path);
+        let mut image = match known.map(|id| &self.images[id]) {
+            Some(image) if !image.is_removed => {
+                return Err(Error::Busy("this picture is a demonstration already"));
+            }
+            Some(removed) => MarkedPicture { is_removed: false, ..removed.clone() },
+            None => MarkedPicture::of(picture, None)?.0,
+        };
         image.check_file(self.photos())?;
-        self.images.push(image);
-        Ok(self.images.len() - 1)
+        if image.marks.has_object() {
+            image.note.get_or_insert("This picture was marked before; these marks are kept.".to_owned());
+        } else {
+            (image.marks, image.saved) = (marks, Saved::Nothing);
+        }
+        let Some(id) = known else {
+            self.images.push(image);
+            return Ok(self.images.len() - 1);
+        };
+        self.images[id] = image;
+        Ok(id)
     }
 
     pub fn save(&mut self, id: usize) {

@@ -138,6 +138,8 @@ pub struct SessionView {
     pub others: Vec<OtherView>,
     /// Photos of the object.
     pub images: Vec<ImageView>,
+    /// Index in `images` of the photo that was opened.
+    pub shown: usize,
     /// Pictures to try.
     pub trial_pictures: Vec<TrialPictureView>,
     /// File for a taught model.

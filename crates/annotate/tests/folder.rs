@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::served::{InPlace, Served, photo, photo_png};
-use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
+use image::{ImageEncoder, RgbImage};
 use sdg_annotate::{Session, SessionOptions};
+use sdg_demonstration::PixelFrame;
 use serde_json::{Value, json};
 
 const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
@@ -21,13 +22,14 @@ fn folder_of(names: &[&str]) -> tempfile::TempDir {
     folder
 }
 
-/// The photo with an Exif orientation that rotates it by 180°.
-fn turned_png() -> Vec<u8> {
+/// The photo with an Exif orientation: 3 rotates it by 180°, 6 by 90°.
+fn turned_png(orientation: u8) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = PngEncoder::new(&mut bytes);
     // Big endian, one entry: tag 0x0112 (orientation), a short.
-    let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0";
-    encoder.set_exif_metadata(exif.to_vec()).unwrap();
+    let mut exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\0\0\0\0\0\0\0".to_vec();
+    exif[19] = orientation;
+    encoder.set_exif_metadata(exif).unwrap();
     photo().write_with_encoder(encoder).unwrap();
     bytes
 }
@@ -126,7 +128,7 @@ fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos
     let served = Served::of_calibrated_project(folder_of(&["rod.png"]));
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
     teach(&served);
-    served.ask("POST", "/api/trial-pictures?name=turned.png", &turned_png()).json();
+    served.ask("POST", "/api/trial-pictures?name=turned.png", &turned_png(3)).json();
     // The sensor's pixels are those of the photo, in the search and in the browser.
     let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
     assert_eq!(found["detections"][0]["is_accepted"], true);
@@ -134,12 +136,41 @@ fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos
     let red = [[45, 50], [154, 50]].map(|[x, y]| shown.to_rgb8().get_pixel(x, y).0[0] > 128);
     assert_eq!(red, [true, false], "the part is at the left");
     for (path, body) in
-        [("/api/images?name=turned.png", turned_png()), ("/api/trial-pictures/0/accept", MARKS.as_bytes().to_vec())]
+        [("/api/images?name=turned.png", turned_png(3)), ("/api/trial-pictures/0/accept", MARKS.as_bytes().to_vec())]
     {
         let refused = served.ask("POST", path, &body);
         assert!(refused.status == 422 && refused.text().contains("Exif"), "{path}: {}", refused.text());
     }
     assert!(!served.folder.path().join("turned.png").exists());
+
+    // Marked in the folder, such a photo is refused for its orientation and not for the size that its marks name.
+    let folder = folder_of(&[]);
+    std::fs::write(folder.path().join("turned.png"), turned_png(6)).unwrap();
+    std::fs::write(folder.path().join("turned.json"), LABELME).unwrap();
+    let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
+    let options = SessionOptions { project, pixel_frame, ..SessionOptions::default() };
+    let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
+    assert!(refused.contains("Exif"), "{refused}");
+}
+
+#[test]
+fn a_folder_with_more_pictures_than_can_be_tried_offers_the_others() {
+    let folder = folder_of(&["rod.png"]);
+    std::fs::write(folder.path().join("rod.json"), LABELME).unwrap();
+    for number in 0..=500 {
+        RgbImage::new(1, 1).save(folder.path().join(format!("{number}.png"))).unwrap();
+    }
+    let served = Served::of_project(folder);
+    let first = session(&served);
+    assert_eq!((names(&first["images"]), names(&first["trial_pictures"]).len()), (vec!["rod.png"], 500));
+    assert_eq!(names(&first["others"]), ["500.png"]);
+    assert!(first["notes"][0].as_str().unwrap().contains("at most 500 can be tried: 1."), "{}", first["notes"]);
+    let add = || served.ask("POST", "/api/others/0/try", b"").status;
+    assert_eq!(add(), 409);
+    served.ask("DELETE", "/api/trial-pictures/0", b"").json();
+    assert_eq!(add(), 200);
+    assert_eq!(served.ask("POST", "/api/trial-pictures/0/put-back", b"").status, 409);
+    assert_eq!(names(&session(&Served::of_project(served.end()))["trial_pictures"]).len(), 500);
 }
 
 #[test]
@@ -194,6 +225,27 @@ fn a_tried_picture_of_another_folder_is_learnt_from_without_writing_there() {
 }
 
 #[test]
+fn a_tried_picture_that_has_marks_keeps_them() {
+    let folder = folder_of(&["rod.png", "other.png"]);
+    std::fs::write(folder.path().join("other.json"), LABELME).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    assert_eq!(names(&session(&served)["others"]), ["other.png"]);
+    served.ask("POST", "/api/others/0/try", b"").json();
+    let accept = |served: &Served| served.ask("POST", "/api/trial-pictures/0/accept", b"{}").json();
+    let first = accept(&served);
+    assert_eq!(first["marks"]["box"], json!([40.0, 40.0, 140.0, 60.0]));
+    assert!(first["note"].as_str().is_some() && !served.folder.path().join("other.coco.json").exists(), "{first}");
+    // Also after it was removed, in this session and in a later one.
+    served.ask("PUT", "/api/images/1/marks", MARKS.as_bytes()).json();
+    served.ask("DELETE", "/api/images/1", b"").json();
+    let again = accept(&served);
+    assert_eq!((&again["id"], &again["marks"]["grasp"]["jaw_width"]), (&json!(1), &json!(24.0)));
+    served.ask("DELETE", "/api/images/1", b"").json();
+    let later = accept(&Served::of_photo(served.end(), "rod.png"));
+    assert_eq!(later["marks"], again["marks"]);
+}
+
+#[test]
 fn pictures_of_a_folder_are_in_the_natural_order_of_their_names() {
     let others = folder_of(&["p10.png", "P3.png", "p2.png"]);
     let served = Served::of_photo_and_tried(folder_of(&["rod10.png", "rod9.png", "rod.png"]), "rod.png", others.path());
@@ -229,6 +281,23 @@ fn a_photo_of_a_folders_project_opens_that_without_what_has_come_since() {
     let again = session(&Served::of_photo(folder, "a.png"));
     assert_eq!((again["models"].as_array().unwrap().len(), names(&again["others"])), (1, vec!["new.png"]));
     assert_eq!(again["trial_pictures"], json!([]));
+}
+
+#[test]
+fn a_project_that_is_opened_by_its_second_photo_keeps_its_order_and_its_model() {
+    let served = Served::of_project(folder_of(&["a.png", "b.png"]));
+    assert_eq!(names(&session(&served)["others"]), ["a.png", "b.png"]);
+    for id in 0..2 {
+        served.ask("POST", &format!("/api/others/{id}/photo"), b"").json();
+        served.ask("PUT", &format!("/api/images/{id}/marks"), MARKS.as_bytes()).json();
+    }
+    teach(&served);
+    let served = Served::of_photo(served.end(), "b.png");
+    let again = session(&served);
+    assert_eq!((names(&again["images"]), &again["shown"]), (vec!["a.png", "b.png"], &json!(1)));
+    assert_eq!(again["models"][0]["is_stale"], false);
+    let file = std::fs::read(served.folder.path().join("sdg-project.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&file).unwrap()["photos"], json!(["a.png", "b.png"]));
 }
 
 #[test]

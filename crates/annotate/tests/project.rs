@@ -136,6 +136,32 @@ fn a_model_in_another_folder_is_found_without_naming_that_again() {
 }
 
 #[test]
+fn models_outside_the_folder_of_versions_are_found_after_a_move() {
+    let is_found = |served: &Served| {
+        assert_eq!(get(served)["models"][0]["is_current"], true, "{}", get(served)["notes"]);
+        assert_eq!(served.ask("PUT", "/api/models/0/current", b"").status, 200);
+    };
+    // In another folder of the project, which is renamed.
+    let folder = project().end();
+    let out = folder.path().join("out/rod.sdg");
+    let served = Served::of_project_with_model(folder, out);
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let (folder, renamed) = (served.end(), tempfile::tempdir().unwrap());
+    std::fs::rename(folder.path(), renamed.path()).unwrap();
+    is_found(&Served::of_project(renamed));
+
+    // Outside the project, and named again after its move.
+    let (out, renamed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let served = Served::of_project_with_model(project().end(), out.path().join("rod.sdg"));
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let folder = served.end();
+    std::fs::rename(out.path(), renamed.path()).unwrap();
+    is_found(&Served::of_project_with_model(folder, renamed.path().join("rod.sdg")));
+}
+
+#[test]
 fn a_version_keeps_the_settings_of_the_part() {
     let served = project();
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();

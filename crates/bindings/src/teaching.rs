@@ -9,7 +9,7 @@ use sdg_inputs::TeachingFiles;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::model::Model;
-use crate::threads::check_process;
+use crate::threads::check_thread_per_core;
 
 /// The calibrated camera that took the photo.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub fn teach(
     if let Some(SearchRegion { width: 0, .. } | SearchRegion { height: 0, .. }) = options.region {
         return Err(Fault::new(FaultKind::Region, "expected a region of at least 1 × 1 pixels"));
     }
-    check_process()?;
+    check_thread_per_core()?;
     let demonstrations = files.read(&mut options).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
     Ok(TaughtFile::teach(&demonstrations, &options, observe)?.model.into())
 }

@@ -23,11 +23,11 @@ const MAX_THREADS: usize = 1024;
 /// The number is 0 or too large, the system refuses threads, or the process was forked from one with threads of this
 /// library.
 pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T> {
-    check_process()?;
     let Some(count) = threads else {
-        check_owner(READING_PID.load(Ordering::Relaxed))?;
+        check_thread_per_core()?;
         return Ok(work());
     };
+    check_process()?;
     if !(1..=MAX_THREADS).contains(&count) {
         return Err(Fault::new(
             FaultKind::Argument,
@@ -55,8 +55,18 @@ pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Se
 ///
 /// # Errors
 /// The process was forked from one that had detected or taught.
-pub(crate) fn check_process() -> Result<()> {
+fn check_process() -> Result<()> {
     claim(&COMPUTING_PID)
+}
+
+/// Rejects a forked process before work on one thread per core, such as teaching: a reader of a model may own these
+/// threads.
+///
+/// # Errors
+/// The process was forked from one that had read a model, detected or taught.
+pub(crate) fn check_thread_per_core() -> Result<()> {
+    check_process()?;
+    check_owner(READING_PID.load(Ordering::Relaxed))
 }
 
 /// Rejects a forked process before a model is read, which takes one thread per core.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::command_line::CommandLine;
 use crate::error::CameraError;
-use crate::http::Url;
+use crate::http::{Url, without_password};
 
 /// The address of a camera.
 ///
@@ -92,7 +92,8 @@ impl FromStr for Address {
     type Err = CameraError;
 
     fn from_str(text: &str) -> Result<Self, CameraError> {
-        let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
+        let refused =
+            |expected: &str| CameraError::Address { expected: expected.into(), found: without_password(text) };
         let (kind, rest) = text.split_once(':').ok_or_else(|| refused(EXPECTED))?;
         match kind {
             "v4l" => Ok(Self::V4l(match rest {
@@ -257,6 +258,22 @@ mod tests {
         ] {
             let error = text.parse::<Address>().unwrap_err().to_string();
             assert!(error.contains(expected) && error.contains(&format!("\"{text}\"")), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_password_of_a_wrong_address_is_not_printed() {
+        for (text, shown) in [
+            ("http://me:50%off@cam/", "http://me:***@cam/"),
+            ("http://me:a/b@cam/", "http://me:***@cam/"),
+            ("http://me:50@home@cam:80000/", "http://me:***@cam:80000/"),
+            ("https://me:secret@cam/", "https://me:***@cam/"),
+            ("rtsp://me:secret@cam/", "rtsp://me:***@cam/"),
+            ("cmd:'curl http://me:secret@cam/", "cmd:'curl http://me:***@cam/"),
+            ("http://me@cam:80000/", "http://me@cam:80000/"),
+        ] {
+            let error = text.parse::<Address>().unwrap_err().to_string();
+            assert!(error.ends_with(&format!("found \"{shown}\"")), "{text}: {error}");
         }
     }
 }

@@ -56,7 +56,7 @@ pub use decode::decode as decode_picture;
 pub use error::CameraError;
 pub use fault::Fault;
 pub use frame::{Camera, Frame, mean_brightness};
-pub use http::{Url, read_pictures};
+pub use http::{Url, read_pictures, without_password};
 pub use latest::LatestFrame;
 pub use open::open;
 pub use options::{Encoding, OpenOptions};

@@ -30,6 +30,8 @@ pub(crate) struct Reconnecting {
     source: Option<Box<dyn Source>>,
     stall_timeout: Duration,
     next_number: u64,
+    /// Whether any connection has delivered a picture.
+    has_delivered: bool,
     last_frame: Instant,
     num_stalls: u32,
     num_torn: u32,
@@ -57,6 +59,7 @@ impl Reconnecting {
             source: Some(source),
             stall_timeout,
             next_number: 0,
+            has_delivered: false,
             last_frame: Instant::now(),
             num_stalls: 0,
             num_torn: 0,
@@ -120,7 +123,7 @@ impl Camera for Reconnecting {
             Ok(Some(taken)) => {
                 self.next_number += taken.num_skipped + 1;
                 (self.last_frame, self.num_stalls, self.num_torn) = (Instant::now(), 0, 0);
-                self.pause = FIRST_PAUSE;
+                (self.pause, self.has_delivered) = (FIRST_PAUSE, true);
                 let back = self.lost.take().map(|lost| Fault::Back { away_secs: lost.since.elapsed().as_secs_f64() });
                 Ok(Some(Frame {
                     picture: taken.picture,
@@ -153,6 +156,8 @@ impl Camera for Reconnecting {
                 Err(fault(&self.name, Fault::Torn { found }))
             }
             Err(Missing::Gone(why)) => Err(self.lose(why)),
+            // The same command has delivered pictures before, so its camera may come back.
+            Err(Missing::Ended(why)) if self.has_delivered => Err(self.lose(why)),
             Err(Missing::Ended(why)) => Err(CameraError::Ended { camera: self.name.to_string(), why }),
         }
     }

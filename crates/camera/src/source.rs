@@ -32,7 +32,8 @@ pub(crate) enum Missing {
     Torn(String),
     /// The connection is lost.
     Gone(String),
-    /// The camera has ended permanently; if reopened, it would end in the same way.
+    /// The connection ended before its first picture; unless an earlier one delivered pictures, the next would end in
+    /// the same way.
     Ended(String),
 }
 

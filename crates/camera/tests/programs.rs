@@ -87,6 +87,29 @@ fn a_program_that_dies_later_is_started_again() {
 }
 
 #[test]
+fn a_program_is_started_again_until_it_delivers_as_before() {
+    let folder = streams();
+    let [runs, png] = ["runs", "png"].map(|name| folder.path().join(name).display().to_string());
+    // The second run ends without a picture, as while the camera is unplugged.
+    let second = format!("test $(wc -l < \"{runs}\") = 2 && exit 1");
+    let mut camera = open(&format!("sh -c 'echo >> \"{runs}\"; {second}; cat \"{png}\"; exit 3'"));
+    for expected in 0..3 {
+        assert_eq!(camera.next_frame().unwrap().unwrap().number, expected);
+    }
+    for status in ["exit status: 3", "exit status: 1"] {
+        let error = camera.next_frame().unwrap_err();
+        assert!(matches!(error.fault(), Some(Fault::Gone { why }) if why.contains(status)), "{error}");
+    }
+    let back = camera.next_frame().unwrap().unwrap();
+    assert!(back.number == 3 && matches!(back.faults[..], [Fault::Back { .. }]), "{:?}", back.faults);
+
+    // Other output than pictures does not count.
+    let mut camera = open("sh -c 'echo usage; exit 7'");
+    assert!(matches!(camera.next_frame().unwrap_err().fault(), Some(Fault::Torn { .. })));
+    assert!(!camera.next_frame().unwrap_err().is_passing());
+}
+
+#[test]
 fn torn_pictures_and_silence_are_told() {
     let folder = streams();
     let png = folder.path().join("png");

@@ -43,6 +43,7 @@ mod web_browser;
 
 use std::ffi::OsString;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 
 use crate::args::{Args, Command};
@@ -60,7 +61,17 @@ pub fn command() -> ClapCommand {
 /// ends the process.
 pub fn parse_args(arguments: impl IntoIterator<Item = OsString>) -> Args {
     clock::start();
-    Args::from_arg_matches(&command().get_matches_from(arguments)).unwrap_or_else(|error| error.exit())
+    let matches = command().try_get_matches_from(arguments);
+    matches.and_then(|matches| Args::from_arg_matches(&matches)).unwrap_or_else(|error| without_password(error).exit())
+}
+
+/// Hides the password in a wrong address of a camera: clap prints the value as it was given.
+fn without_password(mut error: clap::Error) -> clap::Error {
+    if let Some(ContextValue::String(value)) = error.get(ContextKind::InvalidValue) {
+        let shown = sdg_camera::without_password(value);
+        error.insert(ContextKind::InvalidValue, ContextValue::String(shown));
+    }
+    error
 }
 
 #[doc(hidden)]

@@ -184,6 +184,9 @@ fn cameras_that_are_none_are_refused() {
     };
     assert_refused(&grab("/dev/video0", &[]), 2, &["expected an address of a camera", "/dev/video0"]);
     assert_refused(&grab("https://camera/", &[]), 2, &["https is not supported"]);
+    let with_password = grab("https://me:secret@camera/", &[]);
+    assert_refused(&with_password, 2, &["'https://me:***@camera/'"]);
+    assert!(!String::from_utf8_lossy(&with_password.stderr).contains("secret"));
     assert_refused(&grab("dir:/nowhere", &[]), 1, &["--from", "dir:/nowhere", "expected a folder"]);
     assert_refused(&grab("v4l:/dev/null", &[]), 1, &["v4l:/dev/null", "does not open"]);
     assert_refused(&grab("cmd:no-such-program", &[]), 1, &["cannot be started"]);

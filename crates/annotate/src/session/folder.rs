@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{MAX_TRIAL_PICTURES, Session};
+use super::Session;
 use crate::error::{Error, Result};
 use crate::names::{file_name, free_name};
 use crate::picture::{Picture, pictures_in};
@@ -20,7 +20,7 @@ impl State {
         // A folder that cannot be listed offers nothing; the error is reported when it is written to.
         for path in pictures_in(listed).unwrap_or_default() {
             let path = place.folder.join(path.file_name().unwrap_or_default());
-            if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) {
+            if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) && self.is_other(&path) {
                 self.offered.push(path);
             }
         }
@@ -116,10 +116,8 @@ impl Session {
     pub fn add_other_trial(&self, id: usize) -> Result<TrialPictureView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
+        state.check_room()?;
         let known = state.trial_pictures.iter().position(|trial| trial.picture.path == path);
-        if known.is_none() && state.trial_pictures.len() >= MAX_TRIAL_PICTURES {
-            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
-        }
         let id = match known {
             Some(id) => {
                 state.trial_pictures[id].is_removed = false;

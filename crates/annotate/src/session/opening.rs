@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use super::{MAX_TRIAL_PICTURES, Session, SessionOptions};
+use super::{Session, SessionOptions};
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
@@ -11,7 +11,9 @@ use crate::model_versions::ModelVersions;
 use crate::names::{absolute, free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project};
+use crate::project_file::{
+    Gone, MAX_TRIAL_PICTURES, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project,
+};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -31,7 +33,7 @@ impl Session {
             (None, None) => None,
         };
         let (project, mut gone) = match &place {
-            Some(place) => ProjectFile::open(place)?,
+            Some(place) => ProjectFile::open(place, options.pixel_frame)?,
             None => (ProjectFile::default(), Gone::default()),
         };
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
@@ -69,6 +71,12 @@ impl Session {
             label = label.take().or(named);
             images.push(image);
         }
+        // The first photo is the reference: opening another one changes neither the order nor the model's age.
+        let name = |image: &MarkedPicture| relative(&folder, &image.picture.path);
+        let place_of = |image: &MarkedPicture| project.photos.iter().position(|known| *known == name(image));
+        images.sort_by_key(|image| place_of(image).unwrap_or(usize::MAX));
+        let given = options.images.first();
+        let shown = given.and_then(|(path, _)| images.iter().position(|image| image.picture.path == *path));
         let trial_pictures = trial_pictures(&project, &folder, &images, options, &mut gone)?;
         let mut notes = std::mem::take(&mut gone.notes);
         let temporary = match place {
@@ -144,6 +152,7 @@ impl Session {
             temporary,
             locks: Mutex::default(),
             state: Arc::new(Mutex::new(state)),
+            shown: shown.unwrap_or(0),
             id: new_token()?,
             token: options.token.clone(),
             notes,
@@ -209,12 +218,12 @@ fn trial_pictures(
             if taken {
                 continue;
             }
+            if trial_pictures.len() >= MAX_TRIAL_PICTURES {
+                return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
+            }
             let opened = if is_folder { gone.open(&path, frame) } else { Some(Picture::open(&path, frame)?) };
             trial_pictures.extend(opened.map(|picture| TrialPicture::new(picture, false)));
         }
-    }
-    if trial_pictures.len() > MAX_TRIAL_PICTURES {
-        return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
     }
     Ok(trial_pictures)
 }

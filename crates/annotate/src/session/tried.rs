@@ -5,14 +5,15 @@ use std::path::Path;
 use sdg_demonstration::ModelKind;
 use serde::Deserialize;
 
-use super::{MAX_LABEL_CHARS, MAX_TRIAL_PICTURES, Session};
+use super::{MAX_LABEL_CHARS, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
-use crate::session_state::{MarkedPicture, TrialPicture};
+use crate::project_file::MAX_TRIAL_PICTURES;
+use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
-use crate::views::{ComparedPicture, ImageView, TrialPictureView, VersionFound};
+use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
 
 /// A query whether learning from a picture would help in other pictures.
 #[derive(Deserialize)]
@@ -24,6 +25,17 @@ pub(crate) struct HelpQuestion {
     marks: Marks,
     /// Numbers of the other pictures.
     others: Vec<usize>,
+}
+
+impl State {
+    /// # Errors
+    /// There are as many pictures to try as a session keeps.
+    pub(super) fn check_room(&self) -> Result<()> {
+        if self.trial_ids().count() < MAX_TRIAL_PICTURES {
+            return Ok(());
+        }
+        Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES })
+    }
 }
 
 impl Session {
@@ -41,10 +53,7 @@ impl Session {
     /// # Errors
     /// The bytes are not a picture, or there are more pictures than a session keeps.
     pub fn add_trial_picture(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
-        let count = self.state().trial_pictures.len();
-        if count >= MAX_TRIAL_PICTURES {
-            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
-        }
+        self.state().check_room()?;
         let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
         if let Some(id) = self.same_other(name, bytes) {
             return self.add_other_trial(id);
@@ -102,9 +111,10 @@ impl Session {
     /// Restores a picture to try that was removed in this session.
     ///
     /// # Errors
-    /// Unknown picture, or the project cannot be written.
+    /// Unknown picture, more pictures than a session keeps, or the project cannot be written.
     pub fn put_back_trial_picture(&self, id: usize) -> Result<()> {
         let mut state = self.state();
+        state.check_room()?;
         let count = state.trial_pictures.len();
         state.trial_pictures.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
         state.save_project()
@@ -188,8 +198,9 @@ impl Session {
         pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
-    /// Makes a tried picture a demonstration with these marks. A picture from the page, or from another folder, is
-    /// copied beside the first picture under an unused name: no marks are written into other folders.
+    /// Makes a tried picture a demonstration with these marks, or with those in its file, which are not written over. A
+    /// picture from the page, or from another folder, is copied beside the first picture under an unused name: no marks
+    /// are written into other folders.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
@@ -215,7 +226,9 @@ impl Session {
         state.trial_pictures[trial_id].became = Some(id);
         state.trial_pictures[trial_id].is_absent = false;
         self.settle_place(&mut state, id)?;
-        state.save(id);
+        if !matches!(state.images[id].saved, Saved::Written { .. }) {
+            state.save(id);
+        }
         state.save_project()?;
         Ok(state.image_view(id))
     }

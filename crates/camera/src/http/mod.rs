@@ -24,7 +24,7 @@ use crate::error::CameraError;
 use crate::options::OpenOptions;
 use crate::source::{Missing, Source};
 
-pub use url::Url;
+pub use url::{Url, without_password};
 
 /// Sends a request, and determines from the response whether the server sends motion JPEG or single pictures.
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {

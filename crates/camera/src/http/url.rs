@@ -73,7 +73,8 @@ impl FromStr for Url {
     type Err = CameraError;
 
     fn from_str(text: &str) -> Result<Self, CameraError> {
-        let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
+        let refused =
+            |expected: &str| CameraError::Address { expected: expected.into(), found: without_password(text) };
         let rest = text.strip_prefix("http://").ok_or_else(|| refused("an address that begins with http://"))?;
         // Characters that could end the request line early are rejected.
         if text.chars().any(|character| character.is_ascii_control() || character == ' ') {
@@ -111,6 +112,15 @@ impl FromStr for Url {
             credentials,
         })
     }
+}
+
+/// An address for messages, valid or not: with `***` for the text between `://USER:` and the last `@`.
+pub fn without_password(address: &str) -> String {
+    let parts = address.split_once("://").and_then(|(scheme, rest)| {
+        let (credentials, host) = rest.rsplit_once('@')?;
+        Some((scheme, credentials.split_once(':')?.0, host))
+    });
+    parts.map_or_else(|| address.to_owned(), |(scheme, user, host)| format!("{scheme}://{user}:***@{host}"))
 }
 
 fn percent_decoded(text: &str) -> Option<String> {

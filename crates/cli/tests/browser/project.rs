@@ -446,6 +446,30 @@ fn kept_marks_wait_for_their_project_while_another_is_open_at_the_same_port() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn marks_kept_by_another_tab_stay_until_they_are_saved() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
+    // As a tab that was closed while the server did not answer; this tab has not noticed that.
+    let keep = "return import('/page/store.js').then(({ state }) => {
+            const [{ name, sent }] = state.images;
+            const marks = JSON.parse(sent);
+            marks.box[0] -= 5;
+            localStorage.setItem(`kept-marks:${state.project}`, JSON.stringify({ [name]: { was: sent, marks } }));
+        })";
+    page.browser.run(keep, &[]).unwrap();
+    // Longer than the interval at which the page checks the server and removes its own marks.
+    page.wait_for("a check of the server", "return new Promise((done) => setTimeout(() => done(true), 3500))");
+    are_kept(&page);
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.start_server();
+    page.wait_for("saved", "return document.getElementById('saved').innerText === 'Saved in photo.coco.json'");
+    let [before, after] = ["photo.json", "photo.coco.json"]
+        .map(|name| annotation(&page.folder.path().join("project").join(name)).bbox.x1);
+    assert!((after - (before - 5.0)).abs() < 0.1, "{before} {after}");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn kept_marks_are_sent_although_their_file_has_a_box_of_the_outline() {
     let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
     let draw = "return Promise.all(['store', 'editing'].map((name) => import(`/page/${name}.js`)))

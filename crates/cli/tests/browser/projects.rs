@@ -114,6 +114,20 @@ fn a_photo_is_opened_again_with_its_models_and_tried_pictures() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn the_photo_that_was_opened_is_shown_first() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.png", "b.png"] {
+        std::fs::copy(shipped_photo(), folder.path().join(name)).unwrap();
+    }
+    let project = r#"{"format": 1, "photos": ["a.png", "b.png"], "tried": [], "removed": [], "models": []}"#;
+    std::fs::write(folder.path().join("sdg-project.json"), project).unwrap();
+    let page = Page::open_in(folder, &["b.png"]);
+    photo_of_page(&page, "b.png");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn in_a_new_folder_the_photo_is_chosen_and_the_name_is_asked_for_once() {
     let folder = tempfile::tempdir().unwrap();
     let project = folder.path().join("lever");

@@ -108,6 +108,61 @@ fn a_model_that_another_page_taught_is_adopted() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn pictures_that_cannot_be_compared_are_counted_and_not_called_unchanged() {
+    let page = taught();
+    add(&page, &["cut.png", "whole.png"].map(|name| (name.to_owned(), photo())));
+    patiently(&page, "both", "return document.getElementById('strip').innerText.split('1 found').length === 3");
+    page.click("#tab-teach");
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
+    for number in [1, 2] {
+        page.click(&format!("#version-list li:nth-child({number}) input"));
+        page.settle_frames();
+    }
+    // A compared picture has three cells, another one two.
+    for (name, cells, told) in
+        [("cut.png", 5, "No picture has changed. 1 picture could not be compared."), ("whole.png", 4, "")]
+    {
+        std::fs::write(page.folder.path().join(name), "no picture").unwrap();
+        page.click("#version-list li:nth-child(2) button");
+        let compared = format!("return document.querySelectorAll('#compared td').length === {cells}");
+        patiently(&page, "the table", &compared);
+        assert_eq!(page.text("#compared p"), told);
+    }
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_version_and_a_region_that_another_page_chose_are_adopted() {
+    let page = taught();
+    page.click("#tab-teach");
+    page.click("#teach-start");
+    patiently(&page, "a version", "return document.querySelectorAll('#version-list li').length === 2");
+    page.click("#tab-try");
+    add(&page, &[("other.png".to_owned(), photo())]);
+    let is_found = "return document.getElementById('found').innerText.includes('Found the part')";
+    let region = r#"{"x":0,"y":0,"width":600,"height":440,"picture":[640,480]}"#;
+    for (path, body, is_adopted) in [
+        ("/api/models/0/current", "", "state.models[0].is_current"),
+        ("/api/region", region, "state.region?.width === 600"),
+    ] {
+        patiently(&page, "a grasp", is_found);
+        let choose = "return import('/page/store.js').then(({ state }) => {
+                window.before = state.generation;
+                return fetch(arguments[0], { method: 'PUT', body: arguments[1] });
+            }).then((answer) => { dispatchEvent(new Event('focus')); return answer.ok; })";
+        assert_eq!(page.browser.run(choose, &[json!(path), json!(body)]).unwrap(), json!(true));
+        let again = format!(
+            "return import('/page/store.js').then(({{ state }}) => {is_adopted} && state.generation > window.before)"
+        );
+        page.wait_for("another search", &again);
+    }
+    patiently(&page, "a grasp", is_found);
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_worse_version_and_photos_that_contradict_each_other_are_warned_of() {
     let page = taught();
     // The results of a second version are invented; they are inserted after the page has asked for the versions.

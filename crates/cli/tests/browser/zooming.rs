@@ -1,8 +1,8 @@
-//! The visible region of the photo: zooming to a part, and a window of another size.
+//! The visible region of the photo: zooming to a part, a window of another size, and two fingers.
 
 use serde_json::json;
 
-use super::page::Page;
+use super::page::{HOLD, Page};
 
 /// The shown zoom, in percent.
 fn zoom(page: &Page) -> f64 {
@@ -51,4 +51,41 @@ fn zooming_to_a_part_never_shrinks_the_photo_and_follows_the_window() {
         }
         page.assert_quiet();
     }
+}
+
+/// Two fingers touch these places and both move by `[dx, dy]`.
+fn move_two_fingers(page: &Page, places: [[f64; 2]; 2], [dx, dy]: [f64; 2]) {
+    let finger = |(id, [x, y]): (usize, [f64; 2])| {
+        let to = |x: f64, y: f64| json!({"type": "pointerMove", "duration": 20, "x": x.round(), "y": y.round()});
+        let (down, up) = (json!({"type": "pointerDown", "button": 0}), json!({"type": "pointerUp", "button": 0}));
+        let actions = [to(x, y), down, to(x + dx / 2.0, y + dy / 2.0), to(x + dx, y + dy), up];
+        let parameters = json!({"pointerType": "touch"});
+        json!({"type": "pointer", "id": format!("finger {id}"), "parameters": parameters, "actions": actions})
+    };
+    let fingers: Vec<_> = places.into_iter().enumerate().map(finger).collect();
+    page.browser.perform(&json!(fingers)).unwrap();
+    page.settle_frames();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_photo_follows_two_fingers_while_an_outline_is_drawn() {
+    let page = Page::open();
+    page.click("[data-draw=outline]");
+    for place in [[260.0, 170.0], [385.0, 170.0], [385.0, 275.0]] {
+        page.browser.drag(&[page.on_screen(place)]).unwrap();
+    }
+    let points = "return import('/page/store.js').then(({ state }) => state.draft?.points.length ?? 0)";
+    assert_eq!(page.browser.run(points, &[]).unwrap(), json!(3));
+    let (before, scale) = (page.on_screen(HOLD), zoom(&page));
+    move_two_fingers(&page, [[220.0, 240.0], [420.0, 240.0]].map(|place| page.on_screen(place)), [60.0, 20.0]);
+    let after = page.on_screen(HOLD);
+    let moved = [after[0] - before[0], after[1] - before[1]];
+    assert!((moved[0] - 60.0).abs() < 2.0 && (moved[1] - 20.0).abs() < 2.0, "{moved:?}");
+    assert_eq!(zoom(&page), scale);
+    assert_eq!(page.browser.run(points, &[]).unwrap(), json!(3), "the points are kept");
+    page.browser.press(&["\u{e00c}"]).unwrap();
+    page.settle_frames();
+    assert_eq!(page.browser.run(points, &[]).unwrap(), json!(0), "Esc deletes them");
+    page.assert_quiet();
 }
