@@ -112,7 +112,15 @@ impl AnnotationFormat {
                 file.push_image(file_name, image.width, image.height, objects);
                 Ok(whole(file.to_json()))
             }
-            Self::LabelMe => Ok(whole(labelme::write(file_name, image, objects))),
+            Self::LabelMe => {
+                let without_line = objects.iter().filter(|object| object.grasp.is_none());
+                let left_out = without_line.filter_map(|object| {
+                    let (label, width) = (&object.label, object.jaw_width?);
+                    Some(format!("the jaws of `{label}`, {width} pixels apart: LabelMe's are marks of a grasp's line"))
+                });
+                let left_out = left_out.collect();
+                Ok(WrittenAnnotation { left_out, ..whole(labelme::write(file_name, image, objects)) })
+            }
             Self::YoloPose => Ok(yolo_pose::write(image, objects)),
             Self::OpenDr => Err(Error::ReadOnlyFormat { format: self.name() }),
         }

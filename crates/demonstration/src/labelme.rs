@@ -354,7 +354,11 @@ mod tests {
             outline: Some(Polygon::from_box(&bbox)),
         };
         let written = AnnotationFormat::LabelMe.write(&IMAGE, std::slice::from_ref(&marked)).unwrap();
-        assert_eq!(Annotation::read(written.text.as_bytes(), &IMAGE).unwrap(), [marked]);
+        assert_eq!(Annotation::read(written.text.as_bytes(), &IMAGE).unwrap(), [marked.clone()]);
+        assert!(written.left_out.is_empty());
+        let without_line = Annotation { grasp: None, ..marked };
+        let written = AnnotationFormat::LabelMe.write(&IMAGE, &[without_line]).unwrap();
+        assert_eq!(written.left_out, ["the jaws of `grasp_start`, 42.5 pixels apart: LabelMe's are marks of a grasp's line"]);
     }
 
     /// Every marked position. Reading decimal text may change the last bit.

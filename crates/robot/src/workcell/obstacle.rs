@@ -79,7 +79,8 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
         }
         (None, None, None, Some(normal)) => {
             let direction = Unit::try_new(Vector3::from(normal.get_ref().0), 1e-9)
-                .filter(|direction| direction.iter().all(|x| x.is_finite()));
+                // A length that is not finite makes a direction of zeros or NaN.
+                .filter(|direction| (direction.norm() - 1.0).abs() < 1e-6);
             let Some(direction) = direction else {
                 let found = format!("{:?}", normal.get_ref().0);
                 return Err(source.expected(normal, "plane_normal", "a direction that points out of the solid", found));

@@ -225,6 +225,7 @@ fn obstacles_that_make_no_sense_name_the_line() {
         (36, "cylinder_mm", "capsule_mm = [1, 2]\ncylinder_mm", "expected one of box_mm, cylinder_mm"),
         (43, "[30, 230]", "[30, 20]", "the length at least the diameter"),
         (48, "[-1, 0, 0]", "[0, 0, 0]", "plane_normal: expected a direction"),
+        (48, "[-1, 0, 0]", "[1e200, 0, 0]", "plane_normal: expected a direction"),
         (48, "plane_normal", "shape", "unknown field `shape`"),
     ] {
         assert!(whole.contains(from), "{from}");
