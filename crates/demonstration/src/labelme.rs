@@ -358,7 +358,10 @@ mod tests {
         assert!(written.left_out.is_empty());
         let without_line = Annotation { grasp: None, ..marked };
         let written = AnnotationFormat::LabelMe.write(&IMAGE, &[without_line]).unwrap();
-        assert_eq!(written.left_out, ["the jaws of `grasp_start`, 42.5 pixels apart: LabelMe's are marks of a grasp's line"]);
+        assert_eq!(
+            written.left_out,
+            ["the jaws of `grasp_start`, 42.5 pixels apart: LabelMe's are marks of a grasp's line"]
+        );
     }
 
     /// Every marked position. Reading decimal text may change the last bit.

@@ -34,7 +34,7 @@ pub struct TopicAddress {
     pub is_reliable: bool,
     /// The domain: `ROS_DOMAIN_ID`, unless the option gives another one.
     pub domain_id: u16,
-    /// Whether only connections within this computer are used.
+    /// As in [`NodeConfig::is_loopback_only`].
     pub is_loopback_only: bool,
 }
 

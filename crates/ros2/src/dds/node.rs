@@ -79,7 +79,8 @@ pub struct NodeConfig {
     pub domain_id: u16,
     /// The middleware of the services.
     pub rmw: Rmw,
-    /// Whether the node communicates only with this computer.
+    /// Whether the node announces itself and sends on this computer only. RustDDS's sockets still receive packets of
+    /// other computers.
     pub is_loopback_only: bool,
     /// The parameters for `ros2 param get`, by name.
     pub parameters: Vec<(String, String)>,

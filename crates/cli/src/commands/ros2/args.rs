@@ -69,7 +69,7 @@ pub struct RosArgs {
     /// The RMW whose protocol of services and actions is used: fastrtps or cyclonedds
     #[arg(long, value_name = "NAME", default_value = "fastrtps")]
     pub rmw: Rmw,
-    /// Communicate on this computer only
+    /// Announce the node and send on this computer only; packets of other computers are still received
     #[arg(long)]
     pub loopback: bool,
     /// Subscribe to CompressedImage on image/compressed instead of Image on image
