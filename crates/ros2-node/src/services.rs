@@ -24,6 +24,8 @@ const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Maximum timeout for a picture.
 const MAX_DETECT_TIMEOUT_SECS: f64 = 60.0;
 
+/// Maximum number of requests taken at once, so that neither a flood of them nor a repeated error stops the node.
+const MAX_REQUESTS: usize = 64;
 /// Interval of checks for the end of a grasp.
 const FINISH_POLL: Duration = Duration::from_millis(5);
 
@@ -51,17 +53,17 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
         })
     }
 
-    /// The waiting requests; a Trigger is a request with default values.
+    /// The waiting requests, at most [`MAX_REQUESTS`] of each kind; a Trigger is a request with default values.
     fn requests(&self, lines: &Lines) -> Vec<(Client, Result<Q, RosError>)> {
         let mut requests = Vec::new();
-        loop {
+        for _ in 0..MAX_REQUESTS {
             match self.full.receive(Duration::ZERO) {
                 Ok(Some((id, request))) => requests.push((Client::Full(id), request)),
                 Ok(None) => break,
                 Err(error) => lines.complain(&error.to_string()),
             }
         }
-        loop {
+        for _ in 0..MAX_REQUESTS {
             match self.trigger.receive(Duration::ZERO) {
                 Ok(Some((id, request))) => requests.push((Client::Trigger(id), request.map(|_| Q::default()))),
                 Ok(None) => break,
