@@ -22,8 +22,10 @@ struct Cell {
     loads_kg: Vec<f64>,
     touches: bool,
     mode: ArmMode,
-    /// Time until the arm returns a state.
+    /// Time until the arm returns the next state.
     delay: Duration,
+    /// Distance of the contact below the expected one, m.
+    lower_m: f64,
 }
 
 impl Cell {
@@ -38,7 +40,7 @@ impl Arm for Cell {
     }
 
     fn state(&mut self) -> Result<ArmState> {
-        std::thread::sleep(self.delay);
+        std::thread::sleep(std::mem::take(&mut self.delay));
         Ok(ArmState { mode: self.mode, ..self.arm.state()? })
     }
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
@@ -84,7 +86,8 @@ impl Arm for Cell {
 
 impl CompliantArm for Cell {
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
-        let touched = self.arm.touch_down(touch_down, watch)?;
+        let below_table_m = touch_down.below_table_m - self.lower_m;
+        let touched = self.arm.touch_down(&TouchDown { below_table_m, ..*touch_down }, watch)?;
         Ok(Touched { is_contact: self.touches, ..touched })
     }
 }
@@ -112,6 +115,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         touches: true,
         mode: ArmMode::Idle,
         delay: Duration::ZERO,
+        lower_m: 0.0,
     }
 }
 
@@ -192,19 +196,30 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
 }
 
-/// Finds the part; planning with this picture takes a second longer than [`MAX_AGE`], which is too long.
-struct SlowlyPlanned(Option<Instant>);
+/// Finds the part; planning with each picture takes at least this much longer than [`MAX_AGE`].
+struct SlowlyPlanned {
+    longer: Duration,
+    taken: Option<Instant>,
+}
 
 const MAX_AGE: Duration = Duration::from_millis(50);
+/// More than the second by which planning may take longer.
+const TOO_LONG: Duration = Duration::from_millis(1010);
+
+impl SlowlyPlanned {
+    fn new(longer: Duration) -> Self {
+        Self { longer, taken: None }
+    }
+}
 
 impl PartFinder<Cell> for SlowlyPlanned {
     fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
-        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(1010));
+        (self.taken, cell.delay) = (Some(Instant::now()), MAX_AGE + self.longer);
         Truth.find(cell)
     }
 
     fn picture_time(&self) -> Option<Instant> {
-        self.0
+        self.taken
     }
 }
 
@@ -214,10 +229,29 @@ fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
     let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
     let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), ..config() };
     let camera = CameraPose::InBase(Isometry3::identity());
-    let report = grasp(&mut robot, &mut SlowlyPlanned(None), &mut (), camera, &config).unwrap();
+    let report = grasp(&mut robot, &mut SlowlyPlanned::new(TOO_LONG), &mut (), camera, &config).unwrap();
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.starts_with("the detection is "), "{why}");
     assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
+}
+
+#[test]
+fn planning_the_way_to_above_the_part_may_take_a_second_and_not_more() {
+    let obstacle = Obstacle {
+        name: "box".to_owned(),
+        shape: Shape::Box { half_m: [0.05; 3] },
+        base_from_obstacle: Isometry3::translation(0.45, -0.45, 0.05),
+    };
+    let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), obstacles: vec![obstacle], ..config() };
+    let tcp_from_camera = Isometry3::translation(0.072, 0.0, -0.0534);
+    let camera = CameraPose::OnFlange(ArmGeometry::panda().flange_from_tcp() * tcp_from_camera);
+    for (longer, is_allowed) in [(Duration::from_millis(20), true), (TOO_LONG, false)] {
+        let mut cell = cell(Isometry3::identity());
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let report = grasp(&mut robot, &mut SlowlyPlanned::new(longer), &mut (), camera, &config).unwrap();
+        let has_moved = (cell.arm.state().unwrap().q - ready_pose()).amax() > 1e-3;
+        assert_eq!(has_moved, is_allowed, "{report:?}");
+    }
 }
 
 /// Finds the part, but after it was put down, the part at this pose.
