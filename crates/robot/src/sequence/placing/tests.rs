@@ -414,6 +414,91 @@ fn in_a_bin_a_part_lies_anyhow() {
     let report = run(&mut cell(slid), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 1);
+    // 30 mm beside the bin.
+    let report = run(&mut cell(planar(0.08, 0.0, 0.0)), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part lies beside the bin"), "{why}");
+}
+
+/// Finds the part, and after it was put down also an older one at this pose.
+struct WithOlder {
+    older: Isometry3<f64>,
+    others: Vec<GraspTarget>,
+}
+
+impl PartFinder<Cell> for WithOlder {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, cell: &mut Cell, place: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        let older = GraspTarget { base_from_tcp: self.older, jaw_width_m: 0.02, score: 0.9 };
+        let mut found: Vec<GraspTarget> = Truth.find(cell)?.into_iter().chain([older]).collect();
+        found.sort_by(|a, b| apart_m(place, a).total_cmp(&apart_m(place, b)));
+        self.others = found.split_off(1);
+        Ok(found.pop())
+    }
+
+    fn others(&self) -> Vec<GraspTarget> {
+        self.others.clone()
+    }
+}
+
+#[test]
+fn an_older_part_in_the_bin_is_not_the_one_put_down() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let older = LyingPart { base_from_part: bin.base_from_part(0.02, 0.0), shape: bar() };
+    let known = GraspConfig { part: Some(bar()), lying: vec![older.clone()], ..config() };
+    let placing = PlacingConfig::default();
+    let place = |slid_m: f64| {
+        let mut cell = cell(planar(slid_m, 0.0, 0.0));
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let mut finder = WithOlder { older: older.base_from_part, others: Vec::new() };
+        let camera = CameraPose::InBase(Isometry3::identity());
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &known, &bin, &placing).unwrap()
+    };
+    let report = place(0.03);
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((report.errors[0].distance_m() - 0.03).abs() < 1e-3, "{report:?}");
+    let report = place(0.08);
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part lies beside the bin"), "{why}");
+}
+
+#[test]
+fn the_hand_leaves_a_bin_although_a_part_may_lie_where_the_fingers_are() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let flat = PartShape::new(bar().outline().to_vec(), 0.020, 0.014, 0.008).unwrap();
+    // It lies across the other one, under both fingers; the contact is that with the bin's floor.
+    let base_from_part = bin.base_from_part(0.008, std::f64::consts::FRAC_PI_2);
+    let other = LyingPart { base_from_part, shape: flat.clone() };
+    let known = GraspConfig { part: Some(flat), lying: vec![other], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.008;
+    let report = run(&mut cell, &known, &bin, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+}
+
+#[test]
+fn the_hand_leaves_a_tray_that_is_lower_than_its_file_says() {
+    // At the expected contact, the hand's body is 5 mm above the tops of the neighbouring parts; the real one is 5 mm
+    // lower.
+    let tall = PartShape::new(bar().outline().to_vec(), 0.020, 0.054, 0.030).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    (cell.base_from_part.translation.z, cell.lower_m) = (0.03, 0.005);
+    let known = GraspConfig { part: Some(tall), ..config() };
+    let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
+fn in_a_tray_of_one_row_only_the_pitch_along_it_counts() {
+    let kind = PlaceKind::Tray { cells: [5, 1], pitch_m: [0.1, 0.01] };
+    let goal = Place { kind, ..tray() }.goal(1).unwrap();
+    let report = run(&mut cell(planar(0.006, 0.0, 0.0)), &config(), &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 2);
 }
 
 #[test]
