@@ -1,4 +1,5 @@
-//! Ctrl-C: the first one ends the run and keeps the results so far; the second one ends the program immediately.
+//! Ctrl-C: the first one ends the run and keeps the results so far; the second one ends the program immediately. SIGTERM
+//! and SIGHUP count as Ctrl-C, also in a program that was started with SIGHUP ignored (`nohup`).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

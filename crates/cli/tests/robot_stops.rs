@@ -140,23 +140,25 @@ fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it()
 }
 
 #[test]
-fn ctrl_c_stops_the_arm_on_its_path_and_keeps_the_last_second() {
+fn ctrl_c_and_sigterm_stop_the_arm_on_its_path_and_keep_the_last_second() {
     let folder = tempfile::tempdir().unwrap();
     let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
-    let (simulated, stderr, code) = once_moving(|moving_for| {
-        let simulated = Simulated::start(&[]);
-        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
-        moving.signal("INT");
-        let (stderr, code) = moving.finish();
-        is_on_its_way(&simulated).then_some((simulated, stderr, code))
-    });
-    assert_eq!(code, Some(1), "{stderr}");
-    let expected =
-        format!("the arm's last second: {}\nsdg: the arm was stopped: a person requested it\n", states.display());
-    assert_eq!(stderr, expected);
-    assert!((600..=1002).contains(&num_states(&states)), "{}", num_states(&states));
-    assert_stands(&simulated);
-    assert_eq!(state(&simulated).1, "idle");
+    for signal in ["INT", "TERM"] {
+        let (simulated, stderr, code) = once_moving(|moving_for| {
+            let simulated = Simulated::start(&[]);
+            let moving = Moving::start(&simulated, &workcell, &states, moving_for);
+            moving.signal(signal);
+            let (stderr, code) = moving.finish();
+            is_on_its_way(&simulated).then_some((simulated, stderr, code))
+        });
+        assert_eq!(code, Some(1), "{signal}: {stderr}");
+        let expected =
+            format!("the arm's last second: {}\nsdg: the arm was stopped: a person requested it\n", states.display());
+        assert_eq!(stderr, expected, "{signal}");
+        assert!((600..=1002).contains(&num_states(&states)), "{signal}: {}", num_states(&states));
+        assert_stands(&simulated);
+        assert_eq!(state(&simulated).1, "idle", "{signal}");
+    }
 }
 
 #[test]
@@ -180,5 +182,7 @@ fn a_robot_that_goes_in_a_motion_is_one_line_and_its_last_second_is_kept() {
 #[test]
 fn a_simulated_robot_whose_output_is_closed_ends_without_an_error() {
     // Its standard output is closed after the first line, and it prints another one at the end.
-    assert_eq!(Simulated::start(&[]).interrupted(), Some(0));
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        assert_eq!(Simulated::start(&[]).interrupted(signal), Some(0), "{signal}");
+    }
 }

@@ -26,6 +26,12 @@ impl ArmGeometry {
     /// The hand is modelled as a box with open fingers, wrist and elbow as spheres that are slightly larger than the
     /// links.
     pub fn clearance(&self, q: &JointVector, table_height_m: f64) -> Clearance {
+        self.clearance_beyond(q, table_height_m, 0.0)
+    }
+
+    /// As [`ArmGeometry::clearance`], with finger tips that are lower than the ends of the modelled fingers by their
+    /// extent beyond the tcp, m, at any tilt of the hand.
+    pub fn clearance_beyond(&self, q: &JointVector, table_height_m: f64, fingertip_beyond_tcp_m: f64) -> Clearance {
         let frames = self.frames(q);
         let mut lowest = Clearance { lowest_m: f64::INFINITY, part: ArmPart::FingerTips, time_secs: 0.0 };
         let mut consider = |part, height: f64| {
@@ -37,7 +43,7 @@ impl ArmGeometry {
         let hand = &self.hand;
         let finger_reach = hand.opening_max_m * 0.5 + hand.finger.thickness_m;
         for height in box_heights(&frames.base_from_tcp, hand.finger.half_width_m, finger_reach, 0.0, 0.0) {
-            consider(ArmPart::FingerTips, height);
+            consider(ArmPart::FingerTips, height - fingertip_beyond_tcp_m);
         }
         for height in box_heights(&frames.base_from_hand, hand.half_depth_m, hand.half_width_m, 0.0, hand.length_m) {
             consider(ArmPart::Hand, height);

@@ -1,6 +1,6 @@
 //! Places for putting parts down: a single pose, the cells of a tray, a bin.
 
-use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::error::{Result, RobotError};
 
@@ -168,6 +168,15 @@ impl PlaceGoal {
         Isometry3::from_parts(Translation3::new(self.at_m[0], self.at_m[1], height_m), turn * down)
     }
 
+    /// Distance of a part at x and y of the base frame (m) from the inside of the bin, as seen from above, m: 0 inside.
+    /// `None` for other places.
+    pub fn outside_bin_m(&self, at_m: [f64; 2]) -> Option<f64> {
+        let half_m = self.bin_m?.map(|size_m| 0.5 * size_m);
+        let p = self.base_from_part(0.0, 0.0).inverse() * Point3::new(at_m[0], at_m[1], 0.0);
+        let [x, y] = [0, 1].map(|axis| (p[axis].abs() - half_m[axis]).max(0.0));
+        Some(x.hypot(y))
+    }
+
     /// As [`PlaceGoal::base_from_part`], for parts in the neighbouring cells.
     pub(crate) fn neighbours_in_base(&self, height_m: f64) -> impl Iterator<Item = Isometry3<f64>> {
         let base_from_part = self.base_from_part(height_m, 0.0);
@@ -237,6 +246,19 @@ mod tests {
         }
         assert!(tray().covers([0.42, 0.44]) && tray().covers([0.33, 0.16]));
         assert!(!tray().covers([0.43, 0.3]) && !tray().covers([0.4, 0.14]));
+    }
+
+    #[test]
+    fn a_part_outside_a_bin_has_a_distance_from_it() {
+        let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.05] }, ..tray() }.goal(1).unwrap();
+        // The bin's x is the base's y.
+        for (at_m, expected_m) in
+            [([0.4, 0.24], 0.0), ([0.42, 0.16], 0.0), ([0.4, 0.28], 0.03), ([0.435, 0.2], 0.01), ([0.465, 0.28], 0.05)]
+        {
+            let outside_m = bin.outside_bin_m(at_m).unwrap();
+            assert!((outside_m - expected_m).abs() < 1e-12, "{at_m:?}: {outside_m}");
+        }
+        assert_eq!(tray().goal(1).unwrap().outside_bin_m([0.4, 0.2]), None);
     }
 
     #[test]

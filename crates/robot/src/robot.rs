@@ -18,6 +18,9 @@ const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 const MAX_SLOWDOWNS: usize = 8;
 /// Factor of velocity, acceleration and jerk at each slowdown.
 const SLOWDOWN: f64 = 0.8;
+/// Largest distance of a hand below the limits from which [`Robot::plan_ascent`] plans, m: by this distance a compliant
+/// descent may be lower than the limits.
+const MAX_BELOW_M: f64 = 0.010;
 /// Fraction of the joints' acceleration limits that straight motions of the tcp use, because the measured acceleration
 /// exceeds the commanded one by up to 5 %.
 const LINE_ACCELERATION: f64 = 0.9;
@@ -34,7 +37,7 @@ pub struct Robot<'a, A: Arm> {
     latched: Option<String>,
     /// The load of the hand that was set last.
     load: Load,
-    /// The last compliant descent, until the next motion has ended without an error.
+    /// The last compliant descent, of this program or an earlier one, until the next motion has ended without an error.
     felt_below: Option<FeltBelow>,
 }
 
@@ -123,6 +126,26 @@ impl<'a, A: Arm> Robot<'a, A> {
             let cartesian = cartesian.scaled(share, share, share)?;
             Ok(Trajectory::along_path(path.clone(), &joints, &cartesian)?)
         })
+    }
+
+    /// The straight motion up by `up_m` of an arm that is lower than the limits allow, after a program ended during a
+    /// compliant descent; `None` for an arm within the limits. [`Self::follow`] then allows this motion.
+    ///
+    /// # Errors
+    /// [`RobotError::Unsafe`] if the arm is more than 10 mm lower than the limits allow; [`RobotError::Planning`], and
+    /// the errors of [`Self::commanded`].
+    pub fn plan_ascent(&mut self, up_m: f64, cartesian: &CartesianLimits) -> Result<Option<Trajectory>> {
+        let start = self.commanded()?;
+        let base_from_tcp = self.geometry().forward(&start);
+        let tcp = base_from_tcp.translation.vector;
+        if !self.limits.is_below(&start, tcp.z) {
+            return Ok(None);
+        }
+        self.felt_below = Some(FeltBelow::new(&tcp, tcp.z, MAX_BELOW_M));
+        let mut above = base_from_tcp;
+        above.translation.z += up_m;
+        let path = self.geometry().straight_path(&start, &above, &LineOptions::default())?;
+        self.plan_safely_along(&path, cartesian).map(Some)
     }
 
     /// As [`Self::plan_along`], for a motion that satisfies all limits.

@@ -16,8 +16,8 @@ pub(crate) const TABLE: &str = "table";
 const NUM_SEEDS: u64 = 5;
 /// Maximum number of collision checks of a search: about one second, and ten times as many as difficult paths need.
 const MAX_CHECKS: usize = 50_000;
-/// Distance between the raised table and the lowest point at start and destination, in addition to the planner's
-/// margin, m.
+/// Distance between the raised table and the lowest point at start and destination, and between a held part and the
+/// obstacles at the start, in addition to the planner's margin, m.
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
@@ -88,6 +88,18 @@ pub struct Way {
 }
 
 impl Surroundings<'_> {
+    /// Radius around the tcp within which a held part is kept away from the obstacles, m, if only the largest extent of
+    /// the part is known (`part_radius_m`): an obstacle that is nearer at the start does not touch the part, and must
+    /// not prevent the motion away from it.
+    pub fn held_radius_m(&self, tcp: &Point3<f64>, part_radius_m: f64) -> f64 {
+        let kept_m = PlanOptions::default().margin_m + START_ROOM_M;
+        let free_m = self.obstacles.iter().map(|obstacle| {
+            let p_in_obstacle = obstacle.base_from_obstacle.inverse() * tcp;
+            obstacle.shape.signed_distance_m(&p_in_obstacle) - kept_m
+        });
+        free_m.fold(part_radius_m, f64::min).max(0.0)
+    }
+
     fn model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle(number));
         self.model_with(arm, table_height_m, lying.collect(), arm.hand.opening_max_m)

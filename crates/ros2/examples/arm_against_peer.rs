@@ -25,9 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("feedback: {}", arm.num_feedback());
     println!("second: {}", told(&follow(&mut arm, 0.2, Watch::default())));
     println!("third: {}", told(&follow(&mut arm, 0.3, Watch::default())));
-    let begun = Instant::now();
-    let stop = move || (begun.elapsed() > Duration::from_millis(700)).then_some(StopReason::Interrupted);
-    println!("fourth: {}", told(&follow(&mut arm, 0.4, Watch::new(Box::new(stop)))));
+    println!("fourth: {}", told(&follow(&mut arm, 0.4, soon_stopped())));
     for (name, command) in [
         ("open", HandCommand::Move { opening_m: 0.08, speed_m_s: 0.1 }),
         ("grasp", HandCommand::Grasp { width_m: 0.03, tolerance_m: GRASP_TOLERANCE_M, speed_m_s: 0.1, force_n: 40.0 }),
@@ -40,6 +38,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if hand.is_grasping { "holds" } else { "holds nothing" }
         );
     }
+    // The peer executes the fifth goal and moves the hand until both are cancelled.
+    arm.start_hand(HandCommand::Move { opening_m: 0.06, speed_m_s: 0.1 })?;
+    println!("fifth: {}", told(&follow(&mut arm, -0.4, soon_stopped())));
     // The peer moves the hand until the goal is cancelled.
     arm.start_hand(HandCommand::Move { opening_m: 0.04, speed_m_s: 0.1 })?;
     let endless = arm.finish_hand(&mut Watch::default());
@@ -58,6 +59,13 @@ fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), Robo
     end[6] += by_rad;
     let limits = JointLimits::panda().scaled(0.1, 0.1, 0.1)?;
     robot.follow(Trajectory::point_to_point(&start, &end, &limits)?)
+}
+
+/// A watch that stops the arm after 0.7 s, as a person does.
+fn soon_stopped() -> Watch {
+    let begun = Instant::now();
+    let stop = move || (begun.elapsed() > Duration::from_millis(700)).then_some(StopReason::Interrupted);
+    Watch::new(Box::new(stop))
 }
 
 fn told(result: &Result<(), RobotError>) -> String {

@@ -6,7 +6,8 @@ use std::fs;
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_robot::{
-    GraspConfig, GraspOutcome, GraspStep, GraspTarget, LOOK_HEIGHT_M, PartFinder, RobotError, camera_looking_down,
+    GraspConfig, GraspOutcome, GraspStep, GraspTarget, LOOK_HEIGHT_M, PartFinder, Place, PlaceKind, PlacingConfig,
+    RobotError, camera_looking_down,
 };
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -217,6 +218,26 @@ fn a_target_beside_the_part_closes_on_nothing() {
     });
     assert_eq!(step, GraspStep::Close);
     assert!(why.contains("without touching the part"), "{why}");
+}
+
+#[test]
+fn the_true_pose_decides_whether_a_part_is_in_its_bin() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let kind = PlaceKind::Bin { size_m: [0.010, 0.010] };
+    let bin = Place { name: "bin".to_owned(), at_m: [0.45, -0.25], yaw_rad: 0.0, surface_m: 0.0, kind };
+    let goal = bin.goal(1).unwrap();
+    // The bar is detected 12 mm beside its marks, and after it was put down in the middle of the bin.
+    let beside = true_target().base_from_tcp * Translation3::new(0.012, 0.0, 0.0);
+    let mut looks = 0;
+    let mut wrong = Looking::new(|| {
+        looks += 1;
+        let base_from_tcp = if looks <= 2 { beside } else { goal.base_from_part(0.01, 0.0) };
+        Some(GraspTarget { base_from_tcp, ..true_target() })
+    });
+    let config = AttemptConfig { placing: Some((goal.clone(), PlacingConfig::default())), ..AttemptConfig::default() };
+    let (step, why) = failure(cell.run_attempt(&mut wrong, &config, 1).unwrap());
+    assert_eq!(step, GraspStep::Check, "{why}");
+    assert!(why.starts_with("the part really lies ") && why.ends_with(" mm outside the bin"), "{why}");
 }
 
 struct Broken;

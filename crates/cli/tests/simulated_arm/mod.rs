@@ -33,10 +33,10 @@ impl Simulated {
         Self { child, address: format!("127.0.0.1:{port}") }
     }
 
-    /// The exit code after Ctrl-C.
+    /// The exit code after a signal.
     #[cfg(unix)]
-    pub fn interrupted(mut self) -> Option<i32> {
-        let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
+    pub fn interrupted(mut self, signal: &str) -> Option<i32> {
+        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
         assert!(sent.success());
         self.child.wait().unwrap().code()
     }

@@ -80,6 +80,12 @@ pub enum HeightError {
     /// The lines of sight do not cross: they belong to two parts.
     #[error("expected lines of sight that pass each other within {:.1} mm, found {:.1} mm: two parts", .max_m * 1e3, .miss_m * 1e3)]
     OtherPart { miss_m: f64, max_m: f64 },
+    /// The lines of sight cross, but not where the part was detected.
+    #[error(
+        "expected the part where it was detected, found an object {:.0} mm beside it with a score of {score:.2}",
+        .beside_m * 1e3
+    )]
+    Elsewhere { beside_m: f64, score: f64 },
     /// A number that is not finite or not positive.
     #[error("expected finite places and sizes, and sigmas above 0")]
     NotFinite,
@@ -134,22 +140,29 @@ pub fn triangulate(one: &Sighting, other: &Sighting, relief_m: f64) -> Result<Me
 /// Height from two pictures that show several parts, in any order, and the pair of sightings that most likely shows one
 /// and the same part; `None` if a picture shows nothing.
 ///
+/// `is_near` receives each pair whose lines of sight cross, moved to the height of the crossing. Pairs for which it is
+/// true are preferred to all others; a pair for which it is an error is left out.
+///
 /// # Errors
 /// The error of the first pair if no pair gives a height.
 pub fn triangulate_nearest(
     ones: &[Sighting],
     others: &[Sighting],
     relief_m: f64,
+    is_near: impl Fn(&[Sighting; 2]) -> Result<bool, HeightError>,
 ) -> Option<Result<(MeasuredHeight, [Sighting; 2]), HeightError>> {
-    let mut best: Option<(f64, MeasuredHeight, [Sighting; 2])> = None;
+    let mut best: Option<((bool, f64), MeasuredHeight, [Sighting; 2])> = None;
     let mut error = None;
     for one in ones {
         for other in others {
-            match triangulate(one, other, relief_m) {
-                Ok(height) => {
-                    let misfit = misfit(one, other, &height);
-                    if best.as_ref().is_none_or(|(least, ..)| misfit < *least) {
-                        best = Some((misfit, height, [*one, *other]));
+            let ranked = triangulate(one, other, relief_m).and_then(|height| {
+                let is_far = !is_near(&[one, other].map(|sighting| sighting.at_height(height.height_m)))?;
+                Ok(((is_far, misfit(one, other, &height)), height))
+            });
+            match ranked {
+                Ok((rank, height)) => {
+                    if best.as_ref().is_none_or(|(least, ..)| rank < *least) {
+                        best = Some((rank, height, [*one, *other]));
                     }
                 }
                 Err(found) => {

@@ -78,11 +78,11 @@ impl SafetyLimits {
 
     /// Distance by which the arm is closer to the table than allowed, m.
     fn below_table_m(&self, q: &JointVector) -> f64 {
-        let lowest_m = self.geometry.clearance(q, self.table_height_m).lowest_m - self.fingertip_beyond_tcp_m;
-        self.min_table_clearance_m - lowest_m
+        self.min_table_clearance_m - self.table_clearance(q).lowest_m
     }
 
-    fn is_below(&self, q: &JointVector, tcp_z_m: f64) -> bool {
+    /// Whether the arm is lower than table or workspace allow.
+    pub(crate) fn is_below(&self, q: &JointVector, tcp_z_m: f64) -> bool {
         let is_under_floor = self.workspace.is_some_and(|workspace| tcp_z_m < workspace.min_m.z);
         is_under_floor || self.below_table_m(q) > 0.0
     }

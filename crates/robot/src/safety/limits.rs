@@ -2,7 +2,9 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sdg_fci::Limits;
-use sdg_kinematics::{ArmGeometry, ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Trajectory};
+use sdg_kinematics::{
+    ArmGeometry, ArmPart, CartesianLimits, Clearance, JointLimits, JointVector, NUM_JOINTS, Trajectory,
+};
 
 use crate::arm_state::PERIOD_SECS;
 use crate::safety::self_collision::self_collision;
@@ -211,17 +213,21 @@ impl SafetyLimits {
         Ok(())
     }
 
+    /// The lowest part of the arm, with finger tips that extend beyond the tcp.
+    pub(super) fn table_clearance(&self, q: &JointVector) -> Clearance {
+        self.geometry.clearance_beyond(q, self.table_height_m, self.fingertip_beyond_tcp_m)
+    }
+
     fn check_table(&self, time_secs: f64, q: &JointVector) -> Result<(), Violation> {
-        let clearance = self.geometry.clearance(q, self.table_height_m);
-        let (part, beyond_m) = match clearance.part {
-            ArmPart::FingerTips => ("finger tips", self.fingertip_beyond_tcp_m),
-            ArmPart::Hand => ("hand", 0.0),
-            ArmPart::Wrist => ("wrist", 0.0),
-            ArmPart::Elbow => ("elbow", 0.0),
+        let Clearance { part, lowest_m, .. } = self.table_clearance(q);
+        let part = match part {
+            ArmPart::FingerTips => "finger tips",
+            ArmPart::Hand => "hand",
+            ArmPart::Wrist => "wrist",
+            ArmPart::Elbow => "elbow",
         };
-        let found_m = clearance.lowest_m - beyond_m;
-        if found_m < self.min_table_clearance_m {
-            let (found_mm, min_mm) = (found_m * 1e3, self.min_table_clearance_m * 1e3);
+        if lowest_m < self.min_table_clearance_m {
+            let (found_mm, min_mm) = (lowest_m * 1e3, self.min_table_clearance_m * 1e3);
             return Err(Violation::Table { time_secs, part, found_mm, min_mm });
         }
         Ok(())

@@ -1,5 +1,7 @@
 //! Pictures from the look-out poses, and from above a detection.
 
+use std::time::Instant;
+
 use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
@@ -19,7 +21,11 @@ pub const SURE: f64 = 0.5;
 /// Minimum score of a detection that confirms the first one. The confirming detection must also be within
 /// [`CONFIRMING_TOLERANCE`] (m, rad) of the first one.
 pub const MIN_CONFIRMING_SCORE: f64 = 0.2;
-const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
+pub(super) const CONFIRMING_TOLERANCE: (f64, f64) = (0.015, 0.26);
+/// Distance from the place where a part is expected beyond which a detection is another part, m.
+pub(super) const OTHER_PART_M: f64 = 0.03;
+/// Additional age of a picture while the motion that depends on it is planned, s.
+const MAX_PLANNING_SECS: f64 = 1.0;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes pictures from one look-out pose after the other until the part is found.
@@ -41,7 +47,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.robot.wait(SETTLE_SECS)?;
             looks += 1;
             self.report.looks[0] = looks;
-            if let Some(target) = self.find(|target| target.score >= SURE)? {
+            let found = self.finder.find(self.robot.arm())?;
+            let taken = self.finder.picture_time();
+            if let Some(target) = self.keep(found.filter(|target| target.score >= SURE), taken)? {
                 return Ok(target);
             }
         }
@@ -60,11 +68,24 @@ impl<A: Arm> Sequence<'_, '_, A> {
             }
             looks += 1;
             self.report.looks[1] = looks;
-            if let Some(target) = self.find(|target| target.score >= SURE || confirms(first, target))? {
+            if let Some(target) = self.find_again(first)? {
                 return Ok(target);
             }
         }
         Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks from above it")))
+    }
+
+    /// Takes a picture of the part of the first detection. If its best detection is beside that part, it may be another
+    /// one: a second picture shows whether there is a nearer one.
+    fn find_again(&mut self, first: &GraspTarget) -> Steps<Option<GraspTarget>> {
+        let (mut found, mut taken) = (self.finder.find(self.robot.arm())?, self.finder.picture_time());
+        if found.is_some_and(|best| best.score >= SURE && beside_m(first, &best) > CONFIRMING_TOLERANCE.0)
+            && let Some(nearest) = self.finder.find_nearest(self.robot.arm(), &first.base_from_tcp)?
+        {
+            (found, taken) = (Some(nearest), self.finder.picture_time());
+        }
+        let is_same = |target: &GraspTarget| is_accepted(first, target) && beside_m(first, target) <= OTHER_PART_M;
+        self.keep(found.filter(is_same), taken)
     }
 
     /// Whether the arm has arrived at a place for a picture. An unreachable place is skipped unless it is the first;
@@ -77,11 +98,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Takes a picture and returns its accepted detection; a target that the hand cannot grasp is a failure.
-    fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
-        let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
+    /// Stores and returns the accepted detection of a picture that was `taken` at this time; a target that the hand
+    /// cannot grasp is a failure.
+    fn keep(&mut self, target: Option<GraspTarget>, taken: Option<Instant>) -> Steps<Option<GraspTarget>> {
         self.note_others();
-        self.known.picture_time = self.finder.picture_time();
+        self.known.picture_time = taken;
         self.report.targets.push(target);
         let Some(found) = target else { return Ok(None) };
         let failed = |why: String| Stop::Failed(GraspStep::Detect, why);
@@ -102,24 +123,32 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Stores the positions of the other parts in the last picture.
     pub(super) fn note_others(&mut self) {
-        let table_height_m = self.robot.limits().table_height_m;
         for other in self.finder.others() {
-            if let Some(shape) = shape_of(&other, table_height_m, self.cell.config) {
-                self.known.lying.put(LyingPart { base_from_part: other.base_from_tcp, shape });
-            }
+            self.note_lying(&other);
         }
     }
 
-    /// Fails if the picture on which the next motion depends is too old, for this motion and for every later one that
-    /// depends on the same picture.
-    pub(super) fn check_age(&mut self) -> Steps<()> {
-        self.check_age_with(0.0)?;
+    /// Stores the position of a part that must not be touched.
+    pub(super) fn note_lying(&mut self, part: &GraspTarget) {
+        if let Some(shape) = shape_of(part, self.robot.limits().table_height_m, self.cell.config) {
+            self.known.lying.put(LyingPart { base_from_part: part.base_from_tcp, shape });
+        }
+    }
+
+    /// Fails if the picture on which the next motion depends is too old; called before this motion is planned.
+    pub(super) fn check_age(&self) -> Steps<()> {
+        self.check_age_with(0.0)
+    }
+
+    /// As [`Self::check_age`], called after the motion was planned: planning may take some time. Later motions may depend
+    /// on the same picture.
+    pub(super) fn check_age_as_planned(&mut self) -> Steps<()> {
+        self.check_age_with(MAX_PLANNING_SECS)?;
         self.known.picture_time = None;
         Ok(())
     }
 
-    /// As [`Self::check_age`], without a motion that follows: the picture may be this much older, in seconds.
-    pub(super) fn check_age_with(&self, more_secs: f64) -> Steps<()> {
+    fn check_age_with(&self, more_secs: f64) -> Steps<()> {
         let Some(taken) = self.known.picture_time else { return Ok(()) };
         let max_secs = self.cell.config.max_detection_age_secs + more_secs;
         let age_secs = taken.elapsed().as_secs_f64();
@@ -148,6 +177,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         height_m: f64,
         step: GraspStep,
     ) -> Steps<()> {
+        self.check_age()?;
         let seed = self.robot.commanded()?;
         let grasp = grasps.first().map_or_else(Vector3::zeros, |grasp| grasp.translation.vector);
         let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
@@ -169,7 +199,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let way = self.way_to(&Destination::Poses(&poses));
             let way =
                 way.map_err(|error| if error.latches() { error.into() } else { unreachable(error.to_string()) })?;
-            self.check_age()?;
+            self.check_age_as_planned()?;
             self.travel(way, step)?;
             return Ok(self.robot.wait(SETTLE_SECS)?);
         }
@@ -187,10 +217,20 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let solution = best.ok_or_else(|| {
             unreachable(first_error.map_or_else(String::new, |error: KinematicsError| error.to_string()))
         })?;
-        self.check_age()?;
+        self.check_age_as_planned()?;
         self.move_freely(&solution.q, step)?;
         Ok(self.robot.wait(SETTLE_SECS)?)
     }
+}
+
+/// Horizontal distance between two detections, m.
+pub(super) fn beside_m(one: &GraspTarget, other: &GraspTarget) -> f64 {
+    (one.base_from_tcp.translation.vector - other.base_from_tcp.translation.vector).xy().norm()
+}
+
+/// Whether a second detection counts: it is sure or confirms the first one.
+pub(super) fn is_accepted(first: &GraspTarget, second: &GraspTarget) -> bool {
+    second.score >= SURE || confirms(first, second)
 }
 
 /// Whether a second detection confirms the first one.
@@ -200,3 +240,6 @@ fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
         && apart.translation.vector.norm() <= CONFIRMING_TOLERANCE.0
         && apart.rotation.angle() <= CONFIRMING_TOLERANCE.1
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use sdg_geometry::Angle;
 
+use super::look::{CONFIRMING_TOLERANCE, OTHER_PART_M, beside_m, is_accepted};
 use super::{Sequence, Steps, Stop};
 use crate::arm::Arm;
 use crate::grasp_target::GraspTarget;
@@ -10,6 +11,7 @@ use crate::height::{
     HeightError, HeightMeasurement, HeightReport, HeightSource, MIN_BASELINE_M, MeasuredHeight, Sighting, settle,
     triangulate_nearest,
 };
+use crate::lying_part::LyingParts;
 use crate::perception::GraspStep;
 
 /// Minimum distance of the camera from the part, m: closer pictures show too little of it.
@@ -18,6 +20,10 @@ const MIN_DISTANCE_M: f64 = 0.18;
 /// Sideways shift of the camera for a replacement of a picture that does not show the part, as a fraction of the usual
 /// shift. The replacement is still far enough from the picture on the other side.
 const REPLACEMENT_SHIFT_SHARE: f64 = 0.5;
+
+/// Horizontal distance from the detected part within which lines of sight are preferred to all others, m: another part
+/// beside it may fit better by chance.
+const NEAR_M: f64 = 0.010;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Measures the part's height, if that is configured; returns the grasp at that height.
@@ -52,6 +58,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         let mut target = target.unwrap_or(*seen);
         target.base_from_tcp.translation.z = settled.height_m - measurement.marks_over_grasp_m();
+        if beside_m(seen, &target) > CONFIRMING_TOLERANCE.0 {
+            // The target is another part than the detected one, which must not be touched.
+            self.note_lying(seen);
+        }
         self.report.targets.push(Some(target));
         self.passed(GraspStep::Detect)?;
         Ok(target)
@@ -107,7 +117,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 continue;
             }
             for earlier in &pictures {
-                match triangulate_nearest(earlier, &shown, measurement.relief_m) {
+                let lying = &self.known.lying;
+                let near = |pair: &[Sighting; 2]| is_near(seen, pair, lying);
+                match triangulate_nearest(earlier, &shown, measurement.relief_m, near) {
                     Some(Ok((height, pair))) => {
                         let surface_m = height.height_m - measurement.mark_height_m;
                         let expected = MeasuredHeight { height_m: surface_m, ..height };
@@ -132,7 +144,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
             report.sightings.extend(pair);
             return Ok((height, pair));
         }
-        report.sightings.extend(pictures.iter().filter_map(|shown| shown.first()));
+        let told_m = measurement.told.map_or(marks_m, |told| told.height_m);
+        report.sightings.extend(pictures.iter().filter_map(|shown| nearest(seen, shown, told_m)));
         let min_mm = MIN_BASELINE_M * 1e3;
         Err(fails(why.unwrap_or_else(|| format!("no two pictures from places {min_mm:.0} mm apart show the part"))))
     }
@@ -143,6 +156,36 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let beside = seen.base_from_tcp.rotation * Vector3::new(along_m, across_m, 0.0);
         self.look_down(&[seen.base_from_tcp], [beside.x, beside.y], height_m, GraspStep::Hover)
     }
+}
+
+/// Whether a pair of sightings, moved to the height at which their lines of sight cross, shows the part where it was
+/// detected; an error if it shows another object.
+fn is_near(seen: &GraspTarget, pair: &[Sighting; 2], lying: &LyingParts) -> Result<bool, HeightError> {
+    let targets = pair.map(|sighting| sighting.target);
+    let apart_m = targets.iter().map(|target| beside_m(seen, target)).fold(0.0, f64::max);
+    let is_known = |target: &GraspTarget| lying.all().iter().any(|part| part.is_at(&target.base_from_tcp));
+    let is_other = apart_m > OTHER_PART_M || (apart_m > NEAR_M && targets.iter().any(is_known));
+    if is_other || !targets.iter().all(|target| shows(seen, target)) {
+        let score = targets.iter().map(|target| target.score).fold(f64::INFINITY, f64::min);
+        return Err(HeightError::Elsewhere { beside_m: apart_m, score });
+    }
+    Ok(apart_m <= NEAR_M)
+}
+
+/// Whether a detection may be the detected part, whose height is not known yet: it is sure or confirms it.
+fn shows(seen: &GraspTarget, found: &GraspTarget) -> bool {
+    let mut level = *found;
+    level.base_from_tcp.translation.z = seen.base_from_tcp.translation.z;
+    is_accepted(seen, &level)
+}
+
+/// The sighting in a picture that is nearest to the detected part, with the marks at a height.
+fn nearest(seen: &GraspTarget, shown: &[Sighting], height_m: f64) -> Option<Sighting> {
+    let beside = |sighting: &Sighting| beside_m(seen, &sighting.at_height(height_m).target);
+    let is_there = |sighting: &&Sighting| {
+        beside(sighting) <= CONFIRMING_TOLERANCE.0 && shows(seen, &sighting.at_height(height_m).target)
+    };
+    shown.iter().filter(is_there).min_by(|a, b| beside(a).total_cmp(&beside(b))).copied()
 }
 
 /// The mean grasp of several sightings of one part, with its marks at a height; `None` without sightings.

@@ -14,14 +14,14 @@ use sdg_geometry::{Angle, RotationalSymmetry};
 
 use super::carry::{Aim, BELOW_M};
 use super::held_part::shape_of;
-use super::look::HOVER_SHIFTS_M;
+use super::look::{HOVER_SHIFTS_M, OTHER_PART_M};
 use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
 use crate::camera_pose::CameraPose;
 use crate::error::Result;
 use crate::grasp_target::GraspTarget;
-use crate::lying_part::LyingPart;
+use crate::lying_part::{LyingPart, LyingParts};
 use crate::perception::{GraspStep, PartFinder, StepObserver};
 use crate::place::{PlaceGoal, PlaceOffset};
 use crate::robot::Robot;
@@ -179,9 +179,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let base_from_tcp = self.robot.geometry().forward(&q);
             let shape = self.known.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
+            let older = self.known.lying.clone();
             let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
             lies.into_iter().for_each(|part| self.known.lying.put(part));
-            let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
+            let found = match (self.look_at(goal, &aim.base_from_part, &older, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part may lie in any pose, also under other parts.
                 (None, Some(_)) => return Ok(()),
@@ -189,10 +190,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             };
             let error = beside(&aim.base_from_part, &found.base_from_tcp, placing.symmetry);
             errors.push(error);
-            if let Some(size_m) = goal.bin_m {
-                return match inside(goal, &found.base_from_tcp, size_m) {
-                    true => Ok(()),
-                    false => Err(fails(format!("the part lies beside the bin, {} from its centre", told(&error)))),
+            if let Some(outside_m) = outside_bin_m(goal, &found) {
+                return match outside_m > 0.0 {
+                    true => Err(fails(format!("the part lies beside the bin, {} from its centre", told(&error)))),
+                    false => Ok(()),
                 };
             }
             let is_within = |(distance_m, angle_rad): (f64, f64)| {
@@ -262,8 +263,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.robot.wait(RELEASED_SECS)?;
         self.passed(GraspStep::Release)?;
         let limits = self.cell.config.pace.approach_limits(self.robot.geometry());
-        let motion = self.plan_up([MIN_RETREAT_M, placing.retreat_m], &limits, GraspStep::Release)?;
-        self.follow(motion, GraspStep::Release)?;
+        // The ascent retraces the descent. It is not compared with lying parts, because the contact may be lower than
+        // expected, and parts in a bin may lie anywhere.
+        let lying = std::mem::take(&mut self.known.lying);
+        let planned = self.plan_up([MIN_RETREAT_M, placing.retreat_m], &limits, GraspStep::Release);
+        self.known.lying = lying;
+        self.follow(planned?, GraspStep::Release)?;
         Ok(part_from_tcp)
     }
 
@@ -273,11 +278,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
         release_opening_m(width_m, placing.release_margin_m, &self.robot.geometry().hand)
     }
 
-    /// Measures with a picture where the part lies.
+    /// Measures with a picture where the part lies, among parts that were known before it was released.
     fn look_at(
         &mut self,
         goal: &PlaceGoal,
         base_from_part: &Isometry3<f64>,
+        older: &LyingParts,
         placing: &PlacingConfig,
     ) -> Steps<Option<GraspTarget>> {
         self.begin(GraspStep::Check)?;
@@ -290,7 +296,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
             .collect();
         self.known.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
-        let max_offset_m = max_offset_m(goal);
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
             let arrived = match (&self.cell.camera, self.cell.config.look_outs.first()) {
                 (CameraPose::OnFlange(_), _) => self.hover(&grasps, shift_m, GraspStep::Check),
@@ -304,16 +309,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
             if !self.has_arrived(arrived, look == 0)? {
                 continue;
             }
-            let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
+            let nearest = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
+            let nearest = nearest.filter(|found| found.score >= SURE);
             self.note_others();
-            let is_here = |found: &GraspTarget| match goal.bin_m {
-                Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
-                None => {
-                    let apart = found.base_from_tcp.translation.vector - base_from_part.translation.vector;
-                    apart.xy().norm() <= max_offset_m
-                }
+            let found = match goal.bin_m {
+                Some(_) => put_into_bin(goal, base_from_part, nearest.into_iter().chain(self.finder.others()), older),
+                None => nearest.filter(|found| apart_m(base_from_part, found) <= max_offset_m(goal)),
             };
-            if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
+            if let Some(found) = found {
                 self.known.picture_time = self.finder.picture_time();
                 return Ok(Some(found));
             }
@@ -325,13 +328,47 @@ impl<A: Arm> Sequence<'_, '_, A> {
 /// Maximum number of orientations, equivalent by the part's symmetry, that are tried for a picture: the orientation in
 /// which the hand released the part may be out of reach at the height of the picture.
 const MAX_VIEW_TURNS: usize = 4;
-/// Largest distance of the part from its place, m; a detection farther away is another part.
-const MAX_PLACE_OFFSET_M: f64 = 0.03;
+/// Largest distance of the part from the walls of a bin beside which it fell, m; a detection farther away is another
+/// part.
+const MAX_BESIDE_BIN_M: f64 = 0.04;
 
 /// Largest distance of a detection from its place, m: in a tray, a part that is nearer to another cell is that cell's.
 fn max_offset_m(goal: &PlaceGoal) -> f64 {
-    let half_pitches_m = goal.tray.iter().flat_map(|tray| tray.pitch_m.map(|pitch_m| 0.5 * pitch_m));
-    half_pitches_m.fold(MAX_PLACE_OFFSET_M, f64::min)
+    // A tray of one row has no cell to which its pitch across the row leads.
+    let half_pitches_m = goal.tray.iter().flat_map(|tray| {
+        let has_neighbour = |axis: usize| tray.neighbours.iter().any(|steps| steps[axis] != 0);
+        [0, 1].map(|axis| if has_neighbour(axis) { 0.5 * tray.pitch_m[axis] } else { f64::INFINITY })
+    });
+    half_pitches_m.fold(OTHER_PART_M, f64::min)
+}
+
+/// The part that was put into a bin, of all parts in a picture: preferably one that was not known before, which may also
+/// lie beside the bin.
+fn put_into_bin(
+    goal: &PlaceGoal,
+    base_from_part: &Isometry3<f64>,
+    shown: impl Iterator<Item = GraspTarget>,
+    older: &LyingParts,
+) -> Option<GraspTarget> {
+    let is_older = |found: &GraspTarget| older.all().iter().any(|part| part.is_at(&found.base_from_tcp));
+    let is_here = |found: &GraspTarget| {
+        let max_m = if is_older(found) { 0.0 } else { MAX_BESIDE_BIN_M };
+        outside_bin_m(goal, found).is_some_and(|outside_m| outside_m <= max_m)
+    };
+    let distance_m = |found: &GraspTarget| apart_m(base_from_part, found);
+    let nearest = |a: &GraspTarget, b: &GraspTarget| distance_m(a).total_cmp(&distance_m(b));
+    shown.filter(is_here).min_by(|a, b| is_older(a).cmp(&is_older(b)).then_with(|| nearest(a, b)))
+}
+
+/// Horizontal distance of a detection from a place, m.
+fn apart_m(place: &Isometry3<f64>, found: &GraspTarget) -> f64 {
+    (found.base_from_tcp.translation.vector - place.translation.vector).xy().norm()
+}
+
+/// As [`PlaceGoal::outside_bin_m`], of a detection.
+fn outside_bin_m(goal: &PlaceGoal, found: &GraspTarget) -> Option<f64> {
+    let p = found.base_from_tcp.translation;
+    goal.outside_bin_m([p.x, p.y])
 }
 
 fn fails(why: String) -> Stop {
@@ -351,13 +388,6 @@ fn yaw(base_from_tcp: &Isometry3<f64>) -> Angle {
 fn beside(place: &Isometry3<f64>, found: &Isometry3<f64>, symmetry: RotationalSymmetry) -> PlaceOffset {
     let apart = place.inverse() * Point3::from(found.translation.vector);
     PlaceOffset { beside_m: [apart.x, apart.y], angle_rad: symmetry.visible(yaw(found) - yaw(place)).radians() }
-}
-
-/// Whether a part is inside a bin, as seen from above.
-fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2]) -> bool {
-    let place = goal.base_from_part(0.0, 0.0);
-    let apart = place.inverse() * Point3::from(found.translation.vector);
-    apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
 }
 
 /// The found pose, rotated by the angle of the part's symmetry that brings it closest to the intended one.

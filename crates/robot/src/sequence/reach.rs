@@ -22,8 +22,6 @@ const SETTLE_SECS: f64 = 0.1;
 const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 /// Opening of the hand beyond a part, both sides together, if other parts leave no room for more, m.
 const NARROW_MARGIN_M: f64 = 0.020;
-/// Additional age of a picture while the way to the part is planned around obstacles, s.
-const MAX_PLANNING_SECS: f64 = 1.0;
 /// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
 /// Largest height above the grasp at which a compliant descent may end, m: the table's height is uncertain.
@@ -40,7 +38,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// descent.
     pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.begin(GraspStep::Approach)?;
-        self.check_age_with(0.0)?;
+        self.check_age()?;
         let limits = self.robot.limits();
         let lowest =
             self.surface_height_m().max(limits.table_height_m) + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
@@ -62,8 +60,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     continue;
                 }
             };
-            self.check_age_with(MAX_PLANNING_SECS)?;
-            self.known.picture_time = None;
+            self.check_age_as_planned()?;
             self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
             return match reach {
                 Reach::Around(way) => self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),

@@ -184,6 +184,63 @@ impl TrajectoryArm {
         }
     }
 
+    /// Sends a motion and waits for its end.
+    fn follow_to_end(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        check_start(motion.start(), &self.known()?.q)?;
+        let goal =
+            FollowJointTrajectoryGoal { trajectory: trajectory(motion, &self.config.joints), ..Default::default() };
+        let sent = self.motions.send(goal, ANSWER).map_err(|error| self.lost(error))?;
+        let Some(mut goal) = sent else {
+            let action = self.motions.name();
+            return Err(RobotError::Device(format!("{action} refused the trajectory").into()));
+        };
+        self.forget_reference();
+        let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
+        let (end, result) = match self.motion_end(&mut goal, deadline, watch) {
+            Ok(ended) => ended,
+            Err(error) => {
+                // The motion must not continue without being observed.
+                let cancelled = self.cancel(&mut goal);
+                return Err(more_serious(error, cancelled));
+            }
+        };
+        let said = format!("{}: {} {}", self.motions.name(), error_name(result.error_code), result.error_string);
+        match end {
+            GoalEnd::Succeeded if result.error_code == 0 => {
+                self.commanded = Some(*motion.end());
+                Ok(MotionEnd::Arrived)
+            }
+            GoalEnd::Succeeded | GoalEnd::Aborted => Err(RobotError::Reflex(said.trim_end().to_owned())),
+            GoalEnd::Cancelled => Err(RobotError::Stopped(StopReason::Interrupted)),
+            GoalEnd::Unknown => {
+                Err(self.lost(format!("{} no longer knows the motion: was it restarted?", self.motions.name())))
+            }
+        }
+    }
+
+    fn wait_to_end(&self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        let deadline = Instant::now() + Duration::from_secs_f64(duration_secs.max(0.0));
+        let mut seen_secs = f64::NAN;
+        while Instant::now() < deadline {
+            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
+                return Err(RobotError::Stopped(reason));
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+        Ok(())
+    }
+
+    /// Stops the hand after an error of the arm: its command runs in parallel with the arm's motion.
+    fn with_hand_stopped<T>(&mut self, ended: Result<T>) -> Result<T> {
+        match ended {
+            Err(error) if error.latches() => {
+                let stopped = self.stop();
+                Err(more_serious(error, stopped))
+            }
+            ended => ended,
+        }
+    }
+
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
         let ended = self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
@@ -265,49 +322,14 @@ impl Arm for TrajectoryArm {
 
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
         watch.allow_silence(MAX_SILENCE_SECS);
-        check_start(motion.start(), &self.known()?.q)?;
-        let goal =
-            FollowJointTrajectoryGoal { trajectory: trajectory(motion, &self.config.joints), ..Default::default() };
-        let sent = self.motions.send(goal, ANSWER).map_err(|error| self.lost(error))?;
-        let Some(mut goal) = sent else {
-            let action = self.motions.name();
-            return Err(RobotError::Device(format!("{action} refused the trajectory").into()));
-        };
-        self.forget_reference();
-        let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
-        let (end, result) = match self.motion_end(&mut goal, deadline, watch) {
-            Ok(ended) => ended,
-            Err(error) => {
-                // The motion must not continue without being observed.
-                let cancelled = self.cancel(&mut goal);
-                return Err(more_serious(error, cancelled));
-            }
-        };
-        let said = format!("{}: {} {}", self.motions.name(), error_name(result.error_code), result.error_string);
-        match end {
-            GoalEnd::Succeeded if result.error_code == 0 => {
-                self.commanded = Some(*motion.end());
-                Ok(MotionEnd::Arrived)
-            }
-            GoalEnd::Succeeded | GoalEnd::Aborted => Err(RobotError::Reflex(said.trim_end().to_owned())),
-            GoalEnd::Cancelled => Err(RobotError::Stopped(StopReason::Interrupted)),
-            GoalEnd::Unknown => {
-                Err(self.lost(format!("{} no longer knows the motion: was it restarted?", self.motions.name())))
-            }
-        }
+        let ended = self.follow_to_end(motion, watch);
+        self.with_hand_stopped(ended)
     }
 
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
         watch.allow_silence(MAX_SILENCE_SECS);
-        let deadline = Instant::now() + Duration::from_secs_f64(duration_secs.max(0.0));
-        let mut seen_secs = f64::NAN;
-        while Instant::now() < deadline {
-            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
-                return Err(RobotError::Stopped(reason));
-            }
-            std::thread::sleep(POLL_INTERVAL);
-        }
-        Ok(())
+        let ended = self.wait_to_end(duration_secs, watch);
+        self.with_hand_stopped(ended)
     }
 
     fn hand(&mut self) -> Result<HandState> {

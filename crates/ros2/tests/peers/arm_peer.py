@@ -31,6 +31,8 @@ class Action:
         self.feedback = peer.writer(at + "/feedback", f"control_msgs/action/{name}_FeedbackMessage", reliable(10))
         self.status = peer.writer(at + "/status", "action_msgs/msg/GoalStatusArray", transient_local(1))
         self.asked, self.ended = [], {}
+        # A goal that runs until it is cancelled, and its result.
+        self.running, self.running_result = None, b""
 
     def accept(self, head, accepted):
         stamp = stamp_now()
@@ -46,13 +48,15 @@ class Action:
         self.serve()
 
     def serve(self):
-        """Answers requests for the results of ended goals, and cancellations of goals that are not running."""
+        """Answers requests for the results of ended goals, and cancellations, which end the goal `running`."""
         self.asked += [(content[:16], head) for head, content in self.results.requests()]
         for goal, head in self.asked:
             if goal in self.ended:
                 self.results.answer(head, self.ended[goal])
         self.asked = [(goal, head) for goal, head in self.asked if goal not in self.ended]
-        self.cancelled(None)
+        if self.cancelled(self.running):
+            goal, self.running = self.running, None
+            self.end(goal, CANCELED, self.running_result)
 
     def cancelled(self, running):
         """Whether the running goal is cancelled."""
@@ -105,6 +109,7 @@ def main(program):
         return True
 
     goals, hands, silent_at = 0, 0, None
+    gripper_result = "control_msgs/msg/GripperCommandResult"
     limit = time.monotonic() + 120
     while client.poll() is None and time.monotonic() < limit:
         arm.serve()
@@ -119,7 +124,7 @@ def main(program):
                 arm.end(goal, SUCCEEDED, result(0, ""))
             elif goals == 2:
                 arm.end(goal, ABORTED, result(-4, "joint 7 was held"))
-            elif goals == 4:
+            elif goals in (4, 5):
                 # Without a cancellation, the goal succeeds, and the client's line shows this.
                 arm.end(goal, SUCCEEDED if play(goal, wanted.trajectory, True) else CANCELED, result(0, ""))
         for head, content in hand.goals.requests():
@@ -127,18 +132,21 @@ def main(program):
             hands += 1
             hand.accept(head, True)
             if hands == 3:
+                # It runs in parallel with the fifth trajectory.
+                hand.running, hand.running_result = goal, bytes(7) + pack(make(gripper_result, position=0.02), gripper_result)
+                continue
+            if hands == 4:
                 until = time.monotonic() + 25
                 while not hand.cancelled(goal) and time.monotonic() < until:
                     time.sleep(0.002)
-                hand.end(goal, CANCELED, bytes(7) + pack(make("control_msgs/msg/GripperCommandResult", position=0.03),
-                                                         "control_msgs/msg/GripperCommandResult"))
+                hand.end(goal, CANCELED, bytes(7) + pack(make(gripper_result, position=0.03), gripper_result))
                 silent_at = time.monotonic() + 0.5
                 continue
             place["finger"] = wanted.position if hands == 1 else 0.015
             time.sleep(0.2)
-            answer = make("control_msgs/msg/GripperCommandResult", position=place["finger"], effort=wanted.max_effort,
+            answer = make(gripper_result, position=place["finger"], effort=wanted.max_effort,
                           stalled=hands == 2, reached_goal=hands == 1)
-            hand.end(goal, SUCCEEDED, bytes(7) + pack(answer, "control_msgs/msg/GripperCommandResult"))
+            hand.end(goal, SUCCEEDED, bytes(7) + pack(answer, gripper_result))
         if silent_at and time.monotonic() > silent_at:
             place["silent"] = True
         time.sleep(0.002)
@@ -150,13 +158,13 @@ def main(program):
     for name, expected in [
         ("first", "arrived"), ("second", "path tolerance violated joint 7 was held"), ("third", "refused the trajectory"),
         ("fourth", "a person requested it"), ("open", "80 mm, holds nothing"), ("grasp", "30 mm, holds"),
-        ("endless", "/panda_hand_controller/gripper_cmd did not end within 15 s"),
+        ("fifth", "a person requested it"), ("endless", "/panda_hand_controller/gripper_cmd did not end within 15 s"),
         ("silent", "no joint states on /joint_states"),
     ]:
         good = expected in told.get(name, "")
         failed += not good
         print(("ok    " if good else "FAIL  ") + f"{name}: {told.get(name)}")
-    good = int(told.get("feedback", 0)) > 0 and done == ["cancel"] * 2
+    good = int(told.get("feedback", 0)) > 0 and done == ["cancel"] * 4
     print(("ok    " if good else "FAIL  ") + f"feedback {told.get('feedback')}, cancellations {len(done)}")
     return failed + (not good) > 0 or client.returncode != 0
 

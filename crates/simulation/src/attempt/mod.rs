@@ -112,12 +112,9 @@ impl Workcell {
         let GraspReport { mut outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
         let placed = config.placing.as_ref().zip(self.true_place_error(config));
         if let (true, Some(((goal, placing), error))) = (outcome.is_held(), placed)
-            && goal.bin_m.is_none()
-            && (error.distance_m > placing.tolerance_m || error.angle_rad > placing.tolerance_rad)
+            && let Some(why) = self.why_not_placed(goal, placing, &error)
         {
             // The measurement by a picture may be wrong; the true position decides.
-            let (distance_mm, angle_deg) = (error.distance_m * 1e3, error.angle_rad.to_degrees());
-            let why = format!("the part really lies {distance_mm:.1} mm and {angle_deg:.1}° beside its place");
             outcome = GraspOutcome::Failed { step: GraspStep::Check, why };
         }
         Ok(AttemptReport {
@@ -141,6 +138,20 @@ impl Workcell {
         let (goal, _) = config.placing.as_ref()?;
         let spec = &self.config().scene.object.as_ref()?.spec;
         Some(spec.grasp_error(&self.base_from_object()?, &goal.base_from_part(0.0, 0.0)))
+    }
+
+    /// The reason why the part is not at its place, of which it has this true offset; `None` if it is there.
+    fn why_not_placed(&self, goal: &PlaceGoal, placing: &PlacingConfig, error: &GraspError) -> Option<String> {
+        let (distance_mm, angle_deg) = (error.distance_m * 1e3, error.angle_rad.to_degrees());
+        if goal.bin_m.is_none() {
+            let is_beside = error.distance_m > placing.tolerance_m || error.angle_rad > placing.tolerance_rad;
+            let why = || format!("the part really lies {distance_mm:.1} mm and {angle_deg:.1}° beside its place");
+            return is_beside.then(why);
+        }
+        let spec = &self.config().scene.object.as_ref()?.spec;
+        let (grasp, _) = spec.grasp_in_base(&self.base_from_object()?);
+        let outside_mm = goal.outside_bin_m([grasp.x, grasp.y])? * 1e3;
+        (outside_mm > 0.0).then(|| format!("the part really lies {outside_mm:.1} mm outside the bin"))
     }
 
     /// Resets everything to the start of an attempt: the arm at rest in a configuration drawn from `seed`.

@@ -1,12 +1,11 @@
 //! `sdg robot home`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
 use nalgebra::Point3;
 use sdg_kinematics::collision::Capsule;
-use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{Trajectory, ready_pose};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -18,6 +17,9 @@ use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, Consent, confirm, write_states};
+
+/// Length of the straight motion up with which an arm that is lower than the limits allow begins, m.
+const ASCENT_M: f64 = 0.030;
 
 /// `sdg robot home`
 #[derive(Debug, Args)]
@@ -59,6 +61,18 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     arm.check_model(workcell.robot)?;
     let interrupt = Interrupt::watch();
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
+    let ascent = robot.plan_ascent(ASCENT_M, &pace.approach_limits(&workcell.robot.geometry()))?;
+    if let Some(ascent) = ascent {
+        let (secs, up_mm) = (ascent.duration_secs(), ASCENT_M * 1e3);
+        let question = format!(
+            "The arm at {address} is lower than the limits allow: first move it {up_mm:.0} mm straight up, in {secs:.1} s?"
+        );
+        if confirm(&question, args.yes)? == Consent::Refused {
+            return Ok(Outcome::Done);
+        }
+        eprintln!("moving straight up, {secs:.1} s; Ctrl-C stops the arm");
+        move_along(&mut robot, vec![ascent], &args.states)?;
+    }
     let motions = plan(&mut robot, &workcell, &pace)?;
     if motions.iter().all(|motion| motion.duration_secs() <= 0.0) {
         eprintln!("the arm at {address} is at home");
@@ -69,18 +83,27 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     eprintln!("moving home, {secs:.1} s; Ctrl-C stops the arm");
-    let moved = follow(&mut robot, motions);
-    if moved.is_err() {
-        write_states(&args.states, robot.watch())?;
-    }
-    moved?;
+    move_along(&mut robot, motions, &args.states)?;
     Ok(Outcome::Done)
 }
 
-/// The motions home, which are checked before the question is asked.
+/// Follows motions, and writes the arm's last second of states after an error.
+fn move_along<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>, states: &Path) -> Result<()> {
+    let moved = follow(robot, motions);
+    if moved.is_err() {
+        write_states(states, robot.watch())?;
+    }
+    Ok(moved?)
+}
+
+/// The motions home, which are checked before the question is asked. The controller gets the load of a held part, with
+/// which the torques are computed.
 fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> Result<Vec<Trajectory>> {
     let home = workcell.home().unwrap_or_else(ready_pose);
     let is_holding = robot.hand()?.is_grasping;
+    if is_holding && let Some(load) = workcell.grasp_config().load {
+        robot.set_load(load)?;
+    }
     let joints = match is_holding {
         true => pace.carry_limits(robot.geometry()),
         false => pace.free_limits(robot.geometry()),
@@ -92,28 +115,14 @@ fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> R
         return Ok(vec![motion]);
     }
     let q = robot.commanded()?;
-    let radius_m = held_radius_m(workcell, &robot.geometry().forward(&q).translation.vector.into());
+    let surroundings =
+        Surroundings { obstacles: &workcell.obstacles, table_clearance_m: FREE_CLEARANCE_M, ..Surroundings::default() };
+    let tcp = Point3::from(robot.geometry().forward(&q).translation.vector);
+    let radius_m = surroundings.held_radius_m(&tcp, workcell.part_radius_m);
     let part = [Capsule::new([0.0; 3], [0.0; 3], radius_m)];
-    let surroundings = Surroundings {
-        obstacles: &workcell.obstacles,
-        held: if is_holding && radius_m > 0.0 { &part[..] } else { &[] },
-        table_clearance_m: FREE_CLEARANCE_M,
-        ..Surroundings::default()
-    };
+    let held = if is_holding && radius_m > 0.0 { &part[..] } else { &[] };
+    let surroundings = Surroundings { held, ..surroundings };
     Ok(robot.plan_around(&surroundings, &Destination::Configuration(&home), &joints)?.motions)
-}
-
-/// Distance from the tcp to which the held part is kept away from obstacles, m. Only the part's largest extent is known:
-/// an obstacle that is nearer at the start does not touch the part, and must not prevent the motion away from it.
-fn held_radius_m(workcell: &Workcell, tcp: &Point3<f64>) -> f64 {
-    /// In addition to the planner's margin, m.
-    const ROOM_M: f64 = 0.002;
-    let kept_m = PlanOptions::default().margin_m + ROOM_M;
-    let free_m = workcell.obstacles.iter().map(|obstacle| {
-        let p_in_obstacle = obstacle.base_from_obstacle.inverse() * tcp;
-        obstacle.shape.signed_distance_m(&p_in_obstacle) - kept_m
-    });
-    free_m.fold(workcell.part_radius_m, f64::min).max(0.0)
 }
 
 /// Fails if a motion from above the minimum height of free motions passes below it. From a lower start, for example
@@ -140,12 +149,12 @@ fn follow<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>) -> sdg_rob
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use nalgebra::{Isometry3, Vector3};
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
     use sdg_kinematics::collision::{Obstacle, Shape};
-    use sdg_kinematics::{ArmGeometry, JointLimits, JointVector};
-    use sdg_robot::{ArmState, CheckedMotion, HandCommand, HandState, Load, LookOut, MotionEnd, PlannedArm, Watch};
+    use sdg_kinematics::{ArmGeometry, IkOptions, JointLimits, JointVector};
+    use sdg_robot::{
+        ArmState, CheckedMotion, HandCommand, HandState, Load, LookOut, MotionEnd, PlannedAction, PlannedArm, Watch,
+    };
 
     use super::*;
 
@@ -153,6 +162,7 @@ mod tests {
     struct Stopped {
         arm: PlannedArm,
         sensitivity: ContactSensitivity,
+        load_kg: Option<f64>,
     }
 
     impl Arm for Stopped {
@@ -183,6 +193,7 @@ mod tests {
             Ok(())
         }
         fn set_load(&mut self, load: Load) -> sdg_robot::Result<()> {
+            self.load_kg = Some(load.mass_kg);
             self.arm.set_load(load)
         }
         fn stop(&mut self) -> sdg_robot::Result<()> {
@@ -202,19 +213,61 @@ mod tests {
         Workcell { look_outs: vec![LookOut::Joints(home)], ..workcell }
     }
 
-    /// Moves home from the ready pose.
-    fn go_home(workcell: &Workcell, is_grasping: bool) -> Result<()> {
+    /// Moves home; returns the arm.
+    fn go_home_from(q: &JointVector, workcell: &Workcell, is_grasping: bool) -> Result<Stopped> {
         let hand = HandState { opening_m: 0.02, is_grasping, force_n: None };
-        let arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), hand.opening_m).with_hand(hand);
-        let mut arm = Stopped { arm, sensitivity: ContactSensitivity::Contact };
+        let arm = PlannedArm::new(ArmGeometry::panda(), *q, hand.opening_m).with_hand(hand);
+        let mut arm = Stopped { arm, sensitivity: ContactSensitivity::Contact, load_kg: None };
         let mut robot = Robot::new(&mut arm, workcell.safety_limits(), Watch::default());
-        let motions = plan(&mut robot, workcell, &Pace::at_speed(0.1).unwrap())?;
-        Ok(follow(&mut robot, motions)?)
+        let pace = Pace::at_speed(0.1).unwrap();
+        if let Some(ascent) = robot.plan_ascent(ASCENT_M, &pace.approach_limits(&ArmGeometry::panda()))? {
+            follow(&mut robot, vec![ascent])?;
+        }
+        let motions = plan(&mut robot, workcell, &pace)?;
+        follow(&mut robot, motions)?;
+        Ok(arm)
+    }
+
+    /// Moves home from the ready pose.
+    fn go_home(workcell: &Workcell, is_grasping: bool) -> Result<Stopped> {
+        go_home_from(&ready_pose(), workcell, is_grasping)
     }
 
     #[test]
     fn the_thresholds_are_those_of_free_motions() {
-        go_home(&workcell(), false).unwrap();
+        let arm = go_home(&workcell(), false).unwrap();
+        // The motion home alone.
+        assert_eq!(arm.arm.actions().len(), 1);
+    }
+
+    #[test]
+    fn a_hand_below_the_limits_first_moves_straight_up() {
+        let workcell = workcell();
+        let limits = workcell.safety_limits();
+        let lowest_m = limits.table_height_m + limits.fingertip_beyond_tcp_m + limits.min_table_clearance_m;
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let panda = ArmGeometry::panda();
+        let from = |below_m: f64| {
+            let base_from_tcp = Isometry3::from_parts(Translation3::new(0.45, 0.10, lowest_m - below_m), down);
+            let q = panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).unwrap().q;
+            go_home_from(&q, &workcell, false)
+        };
+        let arm = from(0.005).unwrap().arm;
+        let [PlannedAction::Motion(ascent), PlannedAction::Motion(home)] = arm.actions() else {
+            panic!("{:?}", arm.actions())
+        };
+        let [start, end] = [ascent.start(), ascent.end()].map(|q| panda.forward(q).translation.vector);
+        assert!((end - start - Vector3::z() * ASCENT_M).norm() < 1e-4, "{start} {end}");
+        assert!((home.end() - workcell.home().unwrap()).amax() < 1e-9);
+        let error = from(0.015).err().unwrap().to_string();
+        assert!(error.starts_with("the motion was not started: "), "{error}");
+    }
+
+    #[test]
+    fn the_load_is_that_of_a_held_part() {
+        let workcell = Workcell { part_mass_kg: Some(3.0), ..workcell() };
+        assert_eq!(go_home(&workcell, true).unwrap().load_kg, Some(3.0));
+        assert_eq!(go_home(&workcell, false).unwrap().load_kg, None);
     }
 
     #[test]
@@ -227,7 +280,10 @@ mod tests {
             base_from_obstacle: Isometry3::translation(tcp.x, tcp.y, tcp.z - 0.06),
         };
         let workcell = Workcell { obstacles: vec![obstacle], ..workcell() };
-        let radius_m = |up_m: f64| held_radius_m(&workcell, &Point3::from(tcp.vector + Vector3::z() * up_m));
+        let surroundings = Surroundings { obstacles: &workcell.obstacles, ..Surroundings::default() };
+        let radius_m = |up_m: f64| {
+            surroundings.held_radius_m(&Point3::from(tcp.vector + Vector3::z() * up_m), workcell.part_radius_m)
+        };
         assert!((0.030..0.040).contains(&radius_m(0.0)), "{}", radius_m(0.0));
         assert!(radius_m(0.1) == workcell.part_radius_m && radius_m(-0.06) == 0.0);
         // A part that is near an obstacle can be moved away from it.

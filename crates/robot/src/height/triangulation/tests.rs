@@ -90,11 +90,17 @@ fn of_several_parts_the_pair_is_found_that_is_one_part() {
     let look = |camera_x_m: f64| parts_m.map(|part_x_m| shown([camera_x_m, 0.3], part_x_m, 0.016, 0.02));
     let (ones, mut others) = (look(0.44), look(0.56));
     others.reverse();
-    let (height, pair) = triangulate_nearest(&ones, &others, 0.0).unwrap().unwrap();
+    let (height, pair) = triangulate_nearest(&ones, &others, 0.0, |_| Ok(true)).unwrap().unwrap();
     assert!((height.height_m - 0.016).abs() < 1e-6, "{height:?}");
     let apart = pair[0].at_height(height.height_m).middle_m - pair[1].at_height(height.height_m).middle_m;
     assert!(apart.norm() < 1e-9, "{apart}");
-    assert!(triangulate_nearest(&[], &others, 0.0).is_none());
+    assert!(triangulate_nearest(&[], &others, 0.0, |_| Ok(true)).is_none());
+    // Lines of sight to two parts, which fit worse, are chosen if no other pair is near.
+    let is_near = |pair: &[Sighting; 2]| Ok((pair[0].middle_m.z - 0.016).abs() > 0.010);
+    let (height, _) = triangulate_nearest(&ones, &others, 0.0, is_near).unwrap().unwrap();
+    assert!((height.height_m - 0.016).abs() > 0.010, "{height:?}");
+    let refused = HeightError::Elsewhere { beside_m: 0.025, score: 0.3 };
+    assert_eq!(triangulate_nearest(&ones, &others, 0.0, |_| Err(refused)), Some(Err(refused)));
 }
 
 proptest! {

@@ -97,6 +97,22 @@ fn table_and_workspace_stop_a_motion_before_it_begins() {
 }
 
 #[test]
+fn finger_tips_are_checked_also_if_the_hand_is_lower_than_the_tcp() {
+    // The hand is tilted by 42° along the fingers' motion: its body is 3.7 mm lower than the fingers at the tcp.
+    let mut q = ready_pose();
+    (q[5], q[6]) = (q[5] - 42_f64.to_radians(), q[6] + std::f64::consts::FRAC_PI_2);
+    let clearance = ArmGeometry::panda().clearance(&q, 0.0);
+    assert_eq!(clearance.part, ArmPart::Hand);
+    let limits = |fingertip_beyond_tcp_m| {
+        let table_height_m = clearance.lowest_m - 0.002;
+        SafetyLimits { table_height_m, fingertip_beyond_tcp_m, ..SafetyLimits::default() }
+    };
+    limits(0.004).check_table(0.0, &q).unwrap();
+    let found = limits(0.009).check_table(0.0, &q).unwrap_err();
+    assert!(matches!(found, Violation::Table { part: "finger tips", .. }), "{found}");
+}
+
+#[test]
 fn an_arm_that_would_fold_onto_itself_is_stopped_before() {
     let folded = JointVector::from([0.0, -1.7, 0.0, -3.0, 0.0, 0.5, 0.0]);
     let slow = JointLimits::panda().scaled(0.1, 0.1, 0.1).unwrap();

@@ -194,3 +194,97 @@ fn a_camera_beside_the_robot_measures_nothing() {
     let report = grasp(&mut robot, &mut known, &mut (), CameraPose::InBase(Isometry3::identity()), &config).unwrap();
     assert_eq!((report.outcome, report.height), (GraspOutcome::Held, None));
 }
+
+/// Shows parts beside each other. The lines of sight to the first one, which is detected, pass each other 1 mm apart;
+/// those to the others cross exactly.
+struct Beside {
+    parts: Vec<KnownTarget>,
+    is_first_shown: bool,
+    shift_m: f64,
+}
+
+impl Beside {
+    /// The detected part, and another one beside it along the marked line.
+    fn new(beside_m: f64, score: f64, config: &GraspConfig) -> Self {
+        let other = GraspTarget { score, ..at_beside(beside_m) };
+        let parts = [part(0.020), other].map(|part| KnownTarget::new(Some(part), camera(), config));
+        Self { parts: parts.to_vec(), is_first_shown: true, shift_m: 0.0005 }
+    }
+}
+
+/// A part that lies beside the detected one, along the marked line.
+fn at_beside(beside_m: f64) -> GraspTarget {
+    let mut other = part(0.020);
+    other.base_from_tcp.translation.x += beside_m;
+    other
+}
+
+impl PartFinder<PlannedArm> for Beside {
+    fn find(&mut self, _arm: &mut PlannedArm) -> crate::Result<Option<GraspTarget>> {
+        Ok(Some(part(0.020)))
+    }
+
+    fn sight(&mut self, arm: &mut PlannedArm, expected: &GraspTarget) -> crate::Result<Vec<Sighting>> {
+        self.shift_m = -self.shift_m;
+        let mut shown = Vec::new();
+        for (index, known) in self.parts.iter_mut().enumerate().skip(usize::from(!self.is_first_shown)) {
+            for mut sighting in known.sight(arm, expected)? {
+                sighting.middle_m.x += if index == 0 { self.shift_m } else { 0.0 };
+                shown.push(sighting);
+            }
+        }
+        Ok(shown)
+    }
+}
+
+#[test]
+fn of_two_parts_beside_each_other_the_detected_one_is_the_target() {
+    // A part 25 mm away may be the target if no other one is shown, and one 35 mm away may not.
+    for (beside_m, score) in [(0.025, 0.9), (0.025, 0.3), (0.035, 0.9), (0.035, 0.3)] {
+        let config = config(None);
+        let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
+        let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+        let mut finder = Beside::new(beside_m, score, &config);
+        let report = grasp(&mut robot, &mut finder, &mut (), camera(), &config).unwrap();
+        assert_eq!(report.outcome, GraspOutcome::Held);
+        let target = report.targets.last().unwrap().unwrap();
+        assert!(beside_m_of(&target) < 1e-3, "{beside_m} m, {score}: {target:?}");
+    }
+}
+
+fn beside_m_of(target: &GraspTarget) -> f64 {
+    beside_m(target, &part(0.020))
+}
+
+/// The target, or the reason why there is none, if only the other part is shown; with the parts not to be touched.
+fn measured_beside(beside_m: f64, score: f64, told: Option<GivenHeight>) -> (Result<GraspTarget, String>, LyingParts) {
+    let config = config(told);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let mut finder = Beside { is_first_shown: false, ..Beside::new(beside_m, score, &config) };
+    let mut observer = ();
+    let mut sequence = Sequence::new(&mut robot, &mut finder, &mut observer, camera(), &config);
+    let target = sequence.measure_height(&part(0.020)).map_err(|stop| match stop {
+        Stop::Failed(_, why) => why,
+        Stop::Error(error) => error.to_string(),
+    });
+    (target, sequence.known.lying.clone())
+}
+
+#[test]
+fn another_part_is_the_target_only_if_it_is_sure_and_near() {
+    let (target, lying) = measured_beside(0.025, 0.9, None);
+    assert!((beside_m_of(&target.unwrap()) - 0.025).abs() < 1e-3);
+    // The detected part must not be touched.
+    assert_eq!(lying.all().iter().map(|part| part.base_from_part).collect::<Vec<_>>(), [part(0.020).base_from_tcp]);
+    for (beside_m, score, found) in [(0.025, 0.3, "25 mm beside it with a score of 0.30"), (0.035, 0.9, "35 mm")] {
+        let (target, lying) = measured_beside(beside_m, score, None);
+        let why = target.unwrap_err();
+        assert!(why.contains("where it was detected, found an object") && why.contains(found), "{why}");
+        assert!(lying.all().is_empty());
+        // With a given height, the target is where the part was detected.
+        let told = GivenHeight { height_m: 0.036, sigma_m: 0.001 };
+        let target = measured_beside(beside_m, score, Some(told)).0.unwrap();
+        assert!(beside_m_of(&target) < 1e-9, "{target:?}");
+    }
+}

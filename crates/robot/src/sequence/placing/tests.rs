@@ -22,8 +22,10 @@ struct Cell {
     loads_kg: Vec<f64>,
     touches: bool,
     mode: ArmMode,
-    /// Time until the arm returns a state.
+    /// Time until the arm returns the next state.
     delay: Duration,
+    /// Distance of the contact below the expected one, m.
+    lower_m: f64,
 }
 
 impl Cell {
@@ -38,7 +40,7 @@ impl Arm for Cell {
     }
 
     fn state(&mut self) -> Result<ArmState> {
-        std::thread::sleep(self.delay);
+        std::thread::sleep(std::mem::take(&mut self.delay));
         Ok(ArmState { mode: self.mode, ..self.arm.state()? })
     }
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
@@ -84,7 +86,8 @@ impl Arm for Cell {
 
 impl CompliantArm for Cell {
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
-        let touched = self.arm.touch_down(touch_down, watch)?;
+        let below_table_m = touch_down.below_table_m - self.lower_m;
+        let touched = self.arm.touch_down(&TouchDown { below_table_m, ..*touch_down }, watch)?;
         Ok(Touched { is_contact: self.touches, ..touched })
     }
 }
@@ -112,6 +115,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         touches: true,
         mode: ArmMode::Idle,
         delay: Duration::ZERO,
+        lower_m: 0.0,
     }
 }
 
@@ -192,19 +196,30 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
 }
 
-/// Finds the part; planning with this picture takes a second longer than [`MAX_AGE`], which is too long.
-struct SlowlyPlanned(Option<Instant>);
+/// Finds the part; planning with each picture takes at least this much longer than [`MAX_AGE`].
+struct SlowlyPlanned {
+    longer: Duration,
+    taken: Option<Instant>,
+}
 
 const MAX_AGE: Duration = Duration::from_millis(50);
+/// More than the second by which planning may take longer.
+const TOO_LONG: Duration = Duration::from_millis(1010);
+
+impl SlowlyPlanned {
+    fn new(longer: Duration) -> Self {
+        Self { longer, taken: None }
+    }
+}
 
 impl PartFinder<Cell> for SlowlyPlanned {
     fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
-        (self.0, cell.delay) = (Some(Instant::now()), MAX_AGE + Duration::from_millis(1010));
+        (self.taken, cell.delay) = (Some(Instant::now()), MAX_AGE + self.longer);
         Truth.find(cell)
     }
 
     fn picture_time(&self) -> Option<Instant> {
-        self.0
+        self.taken
     }
 }
 
@@ -214,10 +229,29 @@ fn a_picture_that_becomes_too_old_during_planning_starts_no_motion() {
     let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
     let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), ..config() };
     let camera = CameraPose::InBase(Isometry3::identity());
-    let report = grasp(&mut robot, &mut SlowlyPlanned(None), &mut (), camera, &config).unwrap();
+    let report = grasp(&mut robot, &mut SlowlyPlanned::new(TOO_LONG), &mut (), camera, &config).unwrap();
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.starts_with("the detection is "), "{why}");
     assert!(!cell.arm.actions().iter().any(|action| matches!(action, PlannedAction::Hand(_))));
+}
+
+#[test]
+fn planning_the_way_to_above_the_part_may_take_a_second_and_not_more() {
+    let obstacle = Obstacle {
+        name: "box".to_owned(),
+        shape: Shape::Box { half_m: [0.05; 3] },
+        base_from_obstacle: Isometry3::translation(0.45, -0.45, 0.05),
+    };
+    let config = GraspConfig { max_detection_age_secs: MAX_AGE.as_secs_f64(), obstacles: vec![obstacle], ..config() };
+    let tcp_from_camera = Isometry3::translation(0.072, 0.0, -0.0534);
+    let camera = CameraPose::OnFlange(ArmGeometry::panda().flange_from_tcp() * tcp_from_camera);
+    for (longer, is_allowed) in [(Duration::from_millis(20), true), (TOO_LONG, false)] {
+        let mut cell = cell(Isometry3::identity());
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let report = grasp(&mut robot, &mut SlowlyPlanned::new(longer), &mut (), camera, &config).unwrap();
+        let has_moved = (cell.arm.state().unwrap().q - ready_pose()).amax() > 1e-3;
+        assert_eq!(has_moved, is_allowed, "{report:?}");
+    }
 }
 
 /// Finds the part, but after it was put down, the part at this pose.
@@ -380,6 +414,91 @@ fn in_a_bin_a_part_lies_anyhow() {
     let report = run(&mut cell(slid), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 1);
+    // 30 mm beside the bin.
+    let report = run(&mut cell(planar(0.08, 0.0, 0.0)), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part lies beside the bin"), "{why}");
+}
+
+/// Finds the part, and after it was put down also an older one at this pose.
+struct WithOlder {
+    older: Isometry3<f64>,
+    others: Vec<GraspTarget>,
+}
+
+impl PartFinder<Cell> for WithOlder {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, cell: &mut Cell, place: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        let older = GraspTarget { base_from_tcp: self.older, jaw_width_m: 0.02, score: 0.9 };
+        let mut found: Vec<GraspTarget> = Truth.find(cell)?.into_iter().chain([older]).collect();
+        found.sort_by(|a, b| apart_m(place, a).total_cmp(&apart_m(place, b)));
+        self.others = found.split_off(1);
+        Ok(found.pop())
+    }
+
+    fn others(&self) -> Vec<GraspTarget> {
+        self.others.clone()
+    }
+}
+
+#[test]
+fn an_older_part_in_the_bin_is_not_the_one_put_down() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let older = LyingPart { base_from_part: bin.base_from_part(0.02, 0.0), shape: bar() };
+    let known = GraspConfig { part: Some(bar()), lying: vec![older.clone()], ..config() };
+    let placing = PlacingConfig::default();
+    let place = |slid_m: f64| {
+        let mut cell = cell(planar(slid_m, 0.0, 0.0));
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let mut finder = WithOlder { older: older.base_from_part, others: Vec::new() };
+        let camera = CameraPose::InBase(Isometry3::identity());
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &known, &bin, &placing).unwrap()
+    };
+    let report = place(0.03);
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((report.errors[0].distance_m() - 0.03).abs() < 1e-3, "{report:?}");
+    let report = place(0.08);
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part lies beside the bin"), "{why}");
+}
+
+#[test]
+fn the_hand_leaves_a_bin_although_a_part_may_lie_where_the_fingers_are() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    let flat = PartShape::new(bar().outline().to_vec(), 0.020, 0.014, 0.008).unwrap();
+    // It lies across the other one, under both fingers; the contact is that with the bin's floor.
+    let base_from_part = bin.base_from_part(0.008, std::f64::consts::FRAC_PI_2);
+    let other = LyingPart { base_from_part, shape: flat.clone() };
+    let known = GraspConfig { part: Some(flat), lying: vec![other], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    cell.base_from_part.translation.z = 0.008;
+    let report = run(&mut cell, &known, &bin, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+}
+
+#[test]
+fn the_hand_leaves_a_tray_that_is_lower_than_its_file_says() {
+    // At the expected contact, the hand's body is 5 mm above the tops of the neighbouring parts; the real one is 5 mm
+    // lower.
+    let tall = PartShape::new(bar().outline().to_vec(), 0.020, 0.054, 0.030).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    (cell.base_from_part.translation.z, cell.lower_m) = (0.03, 0.005);
+    let known = GraspConfig { part: Some(tall), ..config() };
+    let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
+fn in_a_tray_of_one_row_only_the_pitch_along_it_counts() {
+    let kind = PlaceKind::Tray { cells: [5, 1], pitch_m: [0.1, 0.01] };
+    let goal = Place { kind, ..tray() }.goal(1).unwrap();
+    let report = run(&mut cell(planar(0.006, 0.0, 0.0)), &config(), &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 2);
 }
 
 #[test]
