@@ -186,3 +186,14 @@ fn a_simulated_robot_whose_output_is_closed_ends_without_an_error() {
         assert_eq!(Simulated::start(&[]).interrupted(signal), Some(0), "{signal}");
     }
 }
+
+#[test]
+fn a_program_started_with_nohup_outlives_its_terminal() {
+    let mut nohup = Command::new("nohup");
+    nohup.arg(env!("CARGO_BIN_EXE_sdg"));
+    let simulated = Simulated::start_by(nohup, &[]);
+    simulated.signal("-HUP");
+    thread::sleep(Duration::from_millis(300));
+    assert_eq!(state(&simulated).1, "idle");
+    assert_eq!(simulated.interrupted("-TERM"), Some(0));
+}

@@ -15,13 +15,18 @@ pub struct Simulated {
 
 impl Simulated {
     pub fn start(further: &[&str]) -> Self {
+        Self::start_by(Command::new(env!("CARGO_BIN_EXE_sdg")), further)
+    }
+
+    /// As [`Self::start`], by another program that ends with the path of `sdg`.
+    pub fn start_by(mut program: Command, further: &[&str]) -> Self {
         // Two free neighbouring ports that no other test of this process will use.
         let begin = 20_000 + std::process::id() as u16 % 20_000 + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 50;
         let port = (begin..60_000)
             .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
             .unwrap()
             .to_string();
-        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+        let mut child = program
             .args(["simulate", "--fci", "--lockstep", "--json", "--port", &port])
             .args(further)
             .stdout(Stdio::piped())
@@ -33,11 +38,16 @@ impl Simulated {
         Self { child, address: format!("127.0.0.1:{port}") }
     }
 
+    #[cfg(unix)]
+    pub fn signal(&self, signal: &str) {
+        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    }
+
     /// The exit code after a signal.
     #[cfg(unix)]
     pub fn interrupted(mut self, signal: &str) -> Option<i32> {
-        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        self.signal(signal);
         self.child.wait().unwrap().code()
     }
 }

@@ -46,6 +46,8 @@ const MAX_SILENCE_SECS: f64 = 0.5;
 const MAX_START_DISTANCE_RAD: f64 = 0.05;
 /// Interval of checks while hand or arm moves.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Maximum number of feedback messages taken between two checks.
+const MAX_FEEDBACK: usize = 64;
 
 /// An arm that is controlled over ROS 2.
 pub struct TrajectoryArm {
@@ -151,7 +153,9 @@ impl TrajectoryArm {
             if let Some(ended) = self.motions.result(goal, POLL_INTERVAL).map_err(|error| self.lost(error))? {
                 return Ok(ended);
             }
-            while let Ok(Some(_)) = self.motions.feedback(goal, Duration::ZERO) {
+            // Bounded, so that a flood of feedback does not delay the checks below.
+            for _ in 0..MAX_FEEDBACK {
+                let Ok(Some(_)) = self.motions.feedback(goal, Duration::ZERO) else { break };
                 self.num_feedback += 1;
             }
             if let Some(reason) = self.observe(watch, &mut seen_secs)? {
