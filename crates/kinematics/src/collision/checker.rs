@@ -167,6 +167,7 @@ mod tests {
     use super::*;
     use crate::capsule::Capsule;
     use crate::geometry::ArmGeometry;
+    use crate::ik::IkOptions;
     use crate::joints::ready_pose;
     use crate::test_poses::random_configuration;
     use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -201,7 +202,8 @@ mod tests {
         let mut rng = Pcg64Mcg::seed_from_u64(21);
         let mut num_inside = 0;
         for _ in 0..40 {
-            let model = crowded(&mut rng);
+            let mut model = crowded(&mut rng);
+            model.allow_overlaps_at(Body::HELD_PART, &ready_pose(), 0.3);
             let mut checker = Checker::new(&model, 0.01);
             let configurations: Vec<JointVector> = (0..11).map(|_| random_configuration(&mut rng)).collect();
             let distances = checker.distances_m(&configurations);
@@ -290,5 +292,34 @@ mod tests {
         model.allow(Body::HAND, "table").unwrap();
         assert!(Checker::new(&model, 0.001).is_free(&ready_pose()), "{}", model.nearest(&ready_pose()));
         assert!(model.allow(Body::HAND, "tray").unwrap_err().to_string().contains("the obstacles are: table"));
+    }
+
+    #[test]
+    fn only_the_obstacles_that_are_near_at_a_configuration_may_be_overlapped_as_deeply_as_there() {
+        // A ball of 60 mm around the tcp; the shelf is 40 mm below the tcp, the post 70 mm beside it.
+        let panda = ArmGeometry::panda();
+        let base_from_tcp = panda.forward(&ready_pose());
+        let at = base_from_tcp.translation;
+        let obstacle = |name: &str, half_m: [f64; 3], [x, y, z]: [f64; 3]| Obstacle {
+            name: name.to_owned(),
+            shape: Shape::Box { half_m },
+            base_from_obstacle: Isometry3::translation(at.x + x, at.y + y, at.z + z),
+        };
+        let shelf = obstacle("shelf", [0.1, 0.1, 0.005], [0.0, 0.0, -0.045]);
+        let post = obstacle("post", [0.02; 3], [0.0, 0.09, -0.01]);
+        let mut model = CollisionModel::new(&panda, vec![shelf, post], 0.0).unwrap();
+        model.hold(&[Capsule::new([0.0; 3], [0.0; 3], 0.06)]).unwrap();
+        assert!((model.nearest(&ready_pose()).distance_m + 0.02).abs() < 1e-9);
+        model.allow_overlaps_at(Body::HELD_PART, &ready_pose(), 0.005);
+        assert!(Checker::new(&model, 0.004).is_free(&ready_pose()), "{}", model.nearest(&ready_pose()));
+        for (offset, other, distance_m) in [([0.0, 0.0, -0.01], "shelf", -0.005), ([0.0, 0.02, 0.01], "post", -0.01)] {
+            let mut pose = base_from_tcp;
+            pose.translation.vector += Vector3::from(offset);
+            let q = panda.inverse(&pose, &ready_pose(), &IkOptions::default()).unwrap().q;
+            let found = model.nearest(&q);
+            assert_eq!((found.body, found.other.as_str()), (Body::HELD_PART, other), "{found}");
+            assert!((found.distance_m - distance_m).abs() < 1e-4, "{found}");
+            assert!(!Checker::new(&model, 0.004).is_free(&q));
+        }
     }
 }

@@ -29,7 +29,7 @@ pub struct Proximity {
     pub body: Body,
     /// Name of the obstacle or of the other body.
     pub other: String,
-    /// Distance between the surfaces, m; negative if they overlap.
+    /// Distance between the surfaces plus the allowed overlap, m; negative if they overlap more deeply.
     pub distance_m: f64,
     /// Derivative of the distance with respect to each joint, m/rad. The derivative is not unique if a capsule's axis
     /// is inside an obstacle or parallel to the nearest surface.
@@ -54,8 +54,8 @@ pub struct CollisionModel {
     pub(super) arm: ArmShape,
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) obstacle_frames: Vec<ToLocal>,
-    /// `may_touch[body][obstacle]`: whether contact is allowed.
-    pub(super) may_touch: [Vec<bool>; NUM_BODIES],
+    /// `allowed_overlap_m[body][obstacle]`: length that is added to the distance, m; infinite if contact is allowed.
+    pub(super) allowed_overlap_m: [Vec<f64>; NUM_BODIES],
 }
 
 impl CollisionModel {
@@ -82,8 +82,9 @@ impl CollisionModel {
             });
         }
         let obstacle_frames = obstacles.iter().map(|obstacle| to_local(&obstacle.base_from_obstacle)).collect();
-        let may_touch = std::array::from_fn(|_| vec![false; obstacles.len()]);
-        Ok(Self { geometry: arm.clone(), arm: ArmShape::new(arm, opening_m), obstacles, obstacle_frames, may_touch })
+        let allowed_overlap_m = std::array::from_fn(|_| vec![0.0; obstacles.len()]);
+        let (geometry, arm) = (arm.clone(), ArmShape::new(arm, opening_m));
+        Ok(Self { geometry, arm, obstacles, obstacle_frames, allowed_overlap_m })
     }
 
     /// Sets the held part: capsules that contain it, in the tcp's frame. The part may touch the hand and links 6 and 7.
@@ -110,7 +111,7 @@ impl CollisionModel {
     pub fn allow(&mut self, body: Body, obstacle: &str) -> Result<(), CollisionError> {
         match self.obstacles.iter().position(|candidate| candidate.name == obstacle) {
             Some(index) => {
-                self.may_touch[body.index()][index] = true;
+                self.allowed_overlap_m[body.index()][index] = f64::INFINITY;
                 Ok(())
             }
             None => {
@@ -118,6 +119,20 @@ impl CollisionModel {
                 let existing = if existing.is_empty() { "none".to_owned() } else { existing.join(", ") };
                 Err(CollisionError::UnknownObstacle { name: obstacle.to_owned(), existing })
             }
+        }
+    }
+
+    /// Allows a body to overlap the obstacles that are nearer than `min_distance_m` at a configuration, each only so
+    /// deeply that the distance there counts as `min_distance_m`.
+    ///
+    /// For a body whose capsules are larger than the body: an obstacle inside them does not touch it, and is kept about
+    /// as far away as at this configuration.
+    pub fn allow_overlaps_at(&mut self, body: Body, q: &JointVector, min_distance_m: f64) {
+        let base_from_body = base_from_body(&self.geometry.frames(q), body.index());
+        let placed: Vec<Capsule> = self.capsules(body).iter().map(|capsule| capsule.moved(&base_from_body)).collect();
+        for (obstacle, allowed_m) in self.obstacles.iter().zip(&mut self.allowed_overlap_m[body.index()]) {
+            let distances_m = placed.iter().map(|capsule| nearest_on_axis(obstacle, capsule).1);
+            *allowed_m = allowed_m.max(min_distance_m - distances_m.fold(f64::INFINITY, f64::min));
         }
     }
 
@@ -171,16 +186,10 @@ impl CollisionModel {
         }
         for (body, capsules) in placed.iter().enumerate().skip(FIRST_MOVING) {
             for (index, obstacle) in self.obstacles.iter().enumerate() {
-                if self.may_touch[body][index] {
-                    continue;
-                }
-                let obstacle_from_base = obstacle.base_from_obstacle.inverse();
                 for capsule in capsules {
-                    let [from, to] = [capsule.from, capsule.to].map(|end| obstacle_from_base * end);
-                    let (share, distance_m) = obstacle.shape.nearest_on_segment(&from, &to);
-                    let distance_m = distance_m - capsule.radius_m;
+                    let (local, distance_m) = nearest_on_axis(obstacle, capsule);
+                    let distance_m = distance_m + self.allowed_overlap_m[body][index];
                     if distance_m < nearest.distance_m {
-                        let local: Point3<f64> = from + (to - from) * share;
                         let normal = obstacle.base_from_obstacle * obstacle.shape.outward_normal(&local);
                         let gradient = moved_along(&frames, body, &(obstacle.base_from_obstacle * local), &normal);
                         nearest = Proximity {
@@ -202,15 +211,22 @@ impl CollisionModel {
         let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, self.geometry.joints[0].d_m));
         let mut deepest: Option<(String, f64)> = None;
         for (index, obstacle) in self.obstacles.iter().enumerate() {
-            let obstacle_from_base = obstacle.base_from_obstacle.inverse();
-            let [from, to] = [column.from, column.to].map(|end| obstacle_from_base * end);
-            let depth_m = column.radius_m - obstacle.shape.nearest_on_segment(&from, &to).1;
-            if depth_m > deepest.as_ref().map_or(0.0, |deepest| deepest.1) && !self.may_touch[1][index] {
+            let depth_m = -(nearest_on_axis(obstacle, &column).1 + self.allowed_overlap_m[1][index]);
+            if depth_m > deepest.as_ref().map_or(0.0, |deepest| deepest.1) {
                 deepest = Some((obstacle.name.clone(), depth_m));
             }
         }
         deepest
     }
+}
+
+/// The point on the axis of a capsule (base frame) that is nearest to an obstacle, in the obstacle's frame, and the
+/// distance of the surfaces, m.
+fn nearest_on_axis(obstacle: &Obstacle, capsule: &Capsule) -> (Point3<f64>, f64) {
+    let obstacle_from_base = obstacle.base_from_obstacle.inverse();
+    let [from, to] = [capsule.from, capsule.to].map(|end| obstacle_from_base * end);
+    let (share, distance_m) = obstacle.shape.nearest_on_segment(&from, &to);
+    (from + (to - from) * share, distance_m - capsule.radius_m)
 }
 
 /// Derivative of a body point's position along a direction with respect to each joint, m/rad.

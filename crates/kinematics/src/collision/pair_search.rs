@@ -155,22 +155,23 @@ impl Search {
         // In the order from the held part to link 1, because the outer bodies are close to an obstacle most often.
         for body in (FIRST_MOVING..NUM_BODIES).rev() {
             let capsules = &model.arm.capsules[body];
-            if model.may_touch[body][index] || capsules.is_empty() {
+            let allowed_m = model.allowed_overlap_m[body][index];
+            if allowed_m.is_infinite() || capsules.is_empty() {
                 continue;
             }
             let weight = weights.bodies[body];
             let ball = shape_distances(&to_local.apply(&placed.balls[body]), shape);
-            if self.can_skip(&ball, model.arm.bounds[body].1, weight) {
+            if self.can_skip(&ball, model.arm.bounds[body].1 - allowed_m, weight) {
                 continue;
             }
             for (capsule, (from, to)) in capsules.iter().zip(&placed.capsules[body]) {
                 let local = (to_local.apply(from), to_local.apply(to));
                 let middle = shape_distances(&middle(&local), shape);
                 let half_length_m = 0.5 * (capsule.to - capsule.from).norm();
-                if self.can_skip(&middle, half_length_m + capsule.radius_m, weight) {
+                if self.can_skip(&middle, half_length_m + capsule.radius_m - allowed_m, weight) {
                     continue;
                 }
-                self.take(&segment_shape_distances(&local, shape), capsule.radius_m, weight);
+                self.take(&segment_shape_distances(&local, shape), capsule.radius_m - allowed_m, weight);
             }
         }
     }
