@@ -66,6 +66,10 @@ pub struct Surroundings<'a> {
     pub lying: &'a [LyingPart],
     /// The part in the hand, in the tcp's frame; empty without one.
     pub held: &'a [Capsule],
+    /// Whether obstacles may be nearer to `held` at the start of a free motion than the planner allows, because only the
+    /// largest extent of the part is known. Such an obstacle does not touch the part, and must not prevent the motion
+    /// away from it; the part gets at most 5 mm nearer to it than at the start.
+    pub may_start_near: bool,
     /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
     /// Point on the surface under the grasp or the place, base frame, m. On straight paths the hand may touch the
@@ -88,18 +92,6 @@ pub struct Way {
 }
 
 impl Surroundings<'_> {
-    /// Radius around the tcp within which a held part is kept away from the obstacles, m, if only the largest extent of
-    /// the part is known (`part_radius_m`): an obstacle that is nearer at the start does not touch the part, and must
-    /// not prevent the motion away from it.
-    pub fn held_radius_m(&self, tcp: &Point3<f64>, part_radius_m: f64) -> f64 {
-        let kept_m = PlanOptions::default().margin_m + START_ROOM_M;
-        let free_m = self.obstacles.iter().map(|obstacle| {
-            let p_in_obstacle = obstacle.base_from_obstacle.inverse() * tcp;
-            obstacle.shape.signed_distance_m(&p_in_obstacle) - kept_m
-        });
-        free_m.fold(part_radius_m, f64::min).max(0.0)
-    }
-
     fn model(&self, arm: &ArmGeometry, table_height_m: f64) -> Result<CollisionModel> {
         let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle(number));
         self.model_with(arm, table_height_m, lying.collect(), arm.hand.opening_max_m)
@@ -208,7 +200,10 @@ impl<A: Arm> Robot<'_, A> {
         let start = self.commanded()?;
         let table_m = self.limits().table_height_m;
         let raised_m = surroundings.table_for_motion_m(self.geometry(), table_m, &start, to)?;
-        let model = surroundings.model(self.geometry(), raised_m)?;
+        let mut model = surroundings.model(self.geometry(), raised_m)?;
+        if surroundings.may_start_near {
+            model.allow_overlaps_at(Body::HELD_PART, &start, PlanOptions::default().margin_m + START_ROOM_M);
+        }
         let on_approach = surroundings.contact_model(self.geometry(), table_m)?;
         let mut refused = None;
         for seed in 0..NUM_SEEDS {

@@ -42,6 +42,7 @@ fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
         obstacles: &obstacles,
         lying: &[],
         held: &[],
+        may_start_near: false,
         opening_m: HAND_OPENING_MAX_M,
         support: None,
         table_clearance_m: FREE_CLEARANCE_M,

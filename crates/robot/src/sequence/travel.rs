@@ -78,6 +78,7 @@ fn around<'s>(config: &'s GraspConfig, known: &'s Known) -> Surroundings<'s> {
         obstacles: &config.obstacles,
         lying: known.lying.all(),
         held: known.held.as_ref().map_or(&[], |held| &held.in_tcp),
+        may_start_near: false,
         opening_m: known.opening_m,
         support: known.support,
         table_clearance_m: FREE_CLEARANCE_M,

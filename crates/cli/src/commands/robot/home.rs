@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use nalgebra::Point3;
 use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::{Trajectory, ready_pose};
 use sdg_robot::workcell::Workcell;
@@ -114,14 +113,14 @@ fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> R
         check_height(&motion, robot.limits(), if is_holding { workcell.part_radius_m } else { 0.0 })?;
         return Ok(vec![motion]);
     }
-    let q = robot.commanded()?;
-    let surroundings =
-        Surroundings { obstacles: &workcell.obstacles, table_clearance_m: FREE_CLEARANCE_M, ..Surroundings::default() };
-    let tcp = Point3::from(robot.geometry().forward(&q).translation.vector);
-    let radius_m = surroundings.held_radius_m(&tcp, workcell.part_radius_m);
-    let part = [Capsule::new([0.0; 3], [0.0; 3], radius_m)];
-    let held = if is_holding && radius_m > 0.0 { &part[..] } else { &[] };
-    let surroundings = Surroundings { held, ..surroundings };
+    let part = [Capsule::new([0.0; 3], [0.0; 3], workcell.part_radius_m)];
+    let surroundings = Surroundings {
+        obstacles: &workcell.obstacles,
+        held: if is_holding { &part[..] } else { &[] },
+        may_start_near: true,
+        table_clearance_m: FREE_CLEARANCE_M,
+        ..Surroundings::default()
+    };
     Ok(robot.plan_around(&surroundings, &Destination::Configuration(&home), &joints)?.motions)
 }
 
@@ -149,7 +148,7 @@ fn follow<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>) -> sdg_rob
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+    use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
     use sdg_kinematics::collision::{Obstacle, Shape};
     use sdg_kinematics::{ArmGeometry, IkOptions, JointLimits, JointVector};
     use sdg_robot::{
@@ -272,24 +271,45 @@ mod tests {
 
     #[test]
     fn a_held_part_keeps_away_from_obstacles() {
-        // The obstacle is 40 mm below the tcp in the ready pose; the part's radius is 60 mm.
-        let tcp = ArmGeometry::panda().forward(&ready_pose()).translation;
-        let obstacle = Obstacle {
-            name: "post".to_owned(),
-            shape: Shape::Box { half_m: [0.02; 3] },
-            base_from_obstacle: Isometry3::translation(tcp.x, tcp.y, tcp.z - 0.06),
+        // At the start the shelf is 40 mm below the tcp. The direct way turns joint 1 by 0.5 rad, and its middle passes
+        // 50 mm above the post. The part's radius is 60 mm.
+        const SHELF_M: f64 = 0.040;
+        const POST_M: f64 = 0.050;
+        let panda = ArmGeometry::panda();
+        let tcp = panda.forward(&ready_pose()).translation.vector;
+        let below = |name: &str, angle_rad: f64, below_m: f64| {
+            let at = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad) * tcp;
+            Obstacle {
+                name: name.to_owned(),
+                shape: Shape::Box { half_m: [0.02; 3] },
+                base_from_obstacle: Isometry3::translation(at.x, at.y, at.z - below_m - 0.02),
+            }
         };
-        let workcell = Workcell { obstacles: vec![obstacle], ..workcell() };
-        let surroundings = Surroundings { obstacles: &workcell.obstacles, ..Surroundings::default() };
-        let radius_m = |up_m: f64| {
-            surroundings.held_radius_m(&Point3::from(tcp.vector + Vector3::z() * up_m), workcell.part_radius_m)
+        let obstacles = vec![below("shelf", 0.0, SHELF_M), below("post", 0.25, POST_M)];
+        let workcell = Workcell { obstacles, ..workcell() };
+        // The smallest distances of the tcp from shelf and post.
+        let nearest_m = |is_grasping: bool| {
+            let arm = go_home(&workcell, is_grasping).unwrap().arm;
+            let mut nearest_m = [f64::INFINITY; 2];
+            for action in arm.actions() {
+                let PlannedAction::Motion(motion) = action else { panic!("{action:?}") };
+                for step in 0..=500 {
+                    let (q, ..) = motion.sample(motion.duration_secs() * f64::from(step) / 500.0);
+                    let tcp = Point3::from(panda.forward(&q).translation.vector);
+                    for (least_m, obstacle) in nearest_m.iter_mut().zip(&workcell.obstacles) {
+                        let p_in_obstacle = obstacle.base_from_obstacle.inverse() * tcp;
+                        *least_m = least_m.min(obstacle.shape.signed_distance_m(&p_in_obstacle));
+                    }
+                }
+            }
+            nearest_m
         };
-        assert!((0.030..0.040).contains(&radius_m(0.0)), "{}", radius_m(0.0));
-        assert!(radius_m(0.1) == workcell.part_radius_m && radius_m(-0.06) == 0.0);
-        // A part that is near an obstacle can be moved away from it.
-        for is_grasping in [false, true] {
-            go_home(&workcell, is_grasping).unwrap();
-        }
+        let [_, post_m] = nearest_m(false);
+        assert!((post_m - POST_M).abs() < 1e-3, "{post_m}");
+        // A part that is near an obstacle can be moved away from it, and is kept away from the others.
+        let [shelf_m, post_m] = nearest_m(true);
+        assert!(shelf_m > SHELF_M - 0.005 - 1e-6, "{shelf_m}");
+        assert!(post_m > workcell.part_radius_m - 1e-6, "{post_m}");
     }
 
     #[test]
