@@ -205,7 +205,7 @@ impl TrajectoryArm {
             Err(error) => {
                 // The motion must not continue without being observed.
                 let cancelled = self.cancel(&mut goal);
-                return Err(more_serious(error, cancelled));
+                return Err(with_failed_stop(error, cancelled));
             }
         };
         let said = format!("{}: {} {}", self.motions.name(), error_name(result.error_code), result.error_string);
@@ -239,16 +239,15 @@ impl TrajectoryArm {
         match ended {
             Err(error) if error.latches() => {
                 let stopped = self.stop();
-                Err(more_serious(error, stopped))
+                Err(with_failed_stop(error, stopped))
             }
             ended => ended,
         }
     }
 
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
-        self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
-        let ended = self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
-        check_cancelled(ended.as_ref(), self.motions.name()).map_err(|why| self.lost(why))?;
+        let ended = self.motions.cancel(goal, ANSWER).and_then(|_| self.motions.result(goal, ANSWER));
+        check_cancelled(ended, self.motions.name()).map_err(|why| self.lost(why))?;
         // The controller holds the position at which the arm stopped.
         self.forget_reference();
         Ok(())
@@ -256,22 +255,29 @@ impl TrajectoryArm {
 }
 
 /// Checks that a motion of an action ended after its cancellation, whether or not the server accepted the cancellation.
-fn check_cancelled<E>(ended: Option<&E>, action: &str) -> std::result::Result<(), String> {
-    match ended {
-        Some(_) => Ok(()),
-        None => Err(format!(
-            "{action} did not end the motion within {} s after its cancellation; the arm may still move",
-            ANSWER.as_secs()
-        )),
-    }
+fn check_cancelled<E>(
+    ended: std::result::Result<Option<E>, RosError>,
+    action: &str,
+) -> std::result::Result<(), String> {
+    let why = match ended {
+        Ok(Some(_)) => return Ok(()),
+        Ok(None) => format!("{action} did not end the motion within {} s after its cancellation", ANSWER.as_secs()),
+        Err(error) => format!("the cancellation of the motion was not confirmed: {error}"),
+    };
+    Err(format!("{why}; the arm may still move"))
 }
 
-/// The error to report for a motion that failed with `error` and was then cancelled. If a stopped motion could not be
-/// cancelled, the error of the cancellation is reported, because the robot may still move.
-fn more_serious(error: RobotError, cancelled: Result<()>) -> RobotError {
+/// The error to report for a motion that failed with `error` and was then cancelled. If it could not be cancelled, the
+/// error says so, because the robot may still move; a failed stop replaces [`RobotError::Stopped`], which would claim
+/// the opposite.
+fn with_failed_stop(error: RobotError, cancelled: Result<()>) -> RobotError {
     match (error, cancelled) {
+        (error, Ok(())) => error,
         (RobotError::Stopped(_), Err(not_cancelled)) => not_cancelled,
-        (error, _) => error,
+        (RobotError::Lost { peer, why }, Err(RobotError::Lost { why: not_cancelled, .. })) => {
+            RobotError::Lost { peer, why: format!("{why}; {not_cancelled}") }
+        }
+        (error, Err(not_cancelled)) => RobotError::Device(format!("{error}; {not_cancelled}").into()),
     }
 }
 
@@ -368,7 +374,7 @@ impl Arm for TrajectoryArm {
                 // The fingers may still move. If they cannot be stopped now, a later call of `stop` tries again.
                 self.hand = Some((command, goal));
                 let stopped = self.stop();
-                return Err(more_serious(error, stopped));
+                return Err(with_failed_stop(error, stopped));
             }
         };
         let opening_m = result.position / self.config.gripper_position_per_m;
@@ -404,7 +410,10 @@ impl Arm for TrajectoryArm {
     /// Stops the hand; a motion of the arm ends with the call that started it.
     fn stop(&mut self) -> Result<()> {
         if let Some((_, goal)) = &self.hand {
-            self.gripper.cancel(goal, ANSWER).map_err(|error| RobotError::Hand(error.to_string()))?;
+            let failed = |error: RosError| {
+                RobotError::Hand(format!("its stop was not confirmed: {error}; the fingers may still move"))
+            };
+            self.gripper.cancel(goal, ANSWER).map_err(failed)?;
             self.hand = None;
         }
         Ok(())
@@ -439,12 +448,28 @@ mod tests {
 
     #[test]
     fn a_motion_that_goes_on_after_its_cancellation_is_not_reported_as_stopped() {
-        assert!(check_cancelled(Some(&GoalEnd::Aborted), "/follow").is_ok());
-        let why = check_cancelled::<GoalEnd>(None, "/follow").unwrap_err();
-        assert!(why.contains("/follow did not end the motion within 5 s"), "{why}");
-        let lost = RobotError::Lost { peer: "the arm".to_owned(), why };
-        let reported = more_serious(RobotError::Stopped(StopReason::Interrupted), Err(lost));
-        assert!(matches!(reported, RobotError::Lost { .. }), "{reported}");
+        assert!(check_cancelled(Ok(Some(GoalEnd::Aborted)), "/follow").is_ok());
+        let unanswered = RosError::Network { what: "/follow".to_owned(), why: "no answer".to_owned() };
+        let lost = |why: &str| RobotError::Lost { peer: "the arm".to_owned(), why: why.to_owned() };
+        for (ended, expected) in [
+            (Ok(None), "/follow did not end the motion within 5 s after its cancellation; the arm may still move"),
+            (
+                Err(unanswered),
+                "the cancellation of the motion was not confirmed: /follow: no answer; the arm may still move",
+            ),
+        ] {
+            let why = check_cancelled::<GoalEnd>(ended, "/follow").unwrap_err();
+            assert_eq!(why, expected);
+            let stopped = with_failed_stop(RobotError::Stopped(StopReason::Interrupted), Err(lost(&why)));
+            assert_eq!(stopped.to_string(), lost(expected).to_string());
+            let also_lost = with_failed_stop(lost("no joint states"), Err(lost(&why)));
+            assert_eq!(also_lost.to_string(), lost(&format!("no joint states; {expected}")).to_string());
+            let reflex = with_failed_stop(RobotError::Reflex("contact".to_owned()), Err(lost(&why)));
+            assert!(reflex.latches() && reflex.to_string().contains("contact; "), "{reflex}");
+            assert!(reflex.to_string().ends_with(expected), "{reflex}");
+        }
+        let stopped = with_failed_stop(lost("no joint states"), Ok(()));
+        assert_eq!(stopped.to_string(), lost("no joint states").to_string());
     }
 
     #[test]
