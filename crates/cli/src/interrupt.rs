@@ -16,6 +16,8 @@ impl Interrupt {
     /// Starts watching for Ctrl-C.
     pub fn watch() -> Self {
         let interrupt = Self::default();
+        #[cfg(unix)]
+        watch_terminations(&interrupt.0);
         let flag = Arc::clone(&interrupt.0);
         let mut first: Option<Instant> = None;
         // If no handler can be set, Ctrl-C ends the process; even then, no half-written file is left.
@@ -34,17 +36,16 @@ impl Interrupt {
     }
 }
 
-/// Blocks SIGHUP in this thread, and in the threads that it starts, if the program was started with SIGHUP ignored:
-/// otherwise the handler of `ctrlc` would replace that.
+/// SIGTERM and SIGHUP as a request: a program that drives an arm over ROS 2 must cancel the motion before it ends. A
+/// SIGHUP that was ignored at the start stays ignored.
 #[cfg(unix)]
-pub(crate) fn keep_ignoring_hangups() {
-    use nix::sys::signal::{SigSet, Signal};
+fn watch_terminations(flag: &Arc<AtomicBool>) {
+    use signal_hook::consts::{SIGHUP, SIGTERM};
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
-    if mask.is_some_and(|mask| mask & 1 << (Signal::SIGHUP as u64 - 1) != 0) {
-        let mut hangup = SigSet::empty();
-        hangup.add(Signal::SIGHUP);
-        // An error would leave SIGHUP as Ctrl-C.
-        let _ = hangup.thread_block();
+    let ignored = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    let is_ignored = |signal: i32| ignored.is_some_and(|mask| mask >> (signal - 1) & 1 != 0);
+    for signal in [SIGTERM, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal)) {
+        // If no handler can be set, the signal ends the process; even then, no half-written file is left.
+        let _ = signal_hook::flag::register(signal, Arc::clone(flag));
     }
 }

@@ -77,8 +77,6 @@ fn without_password(mut error: clap::Error) -> clap::Error {
 #[doc(hidden)]
 /// Runs one command; prints errors on one line and returns the exit code.
 pub fn run(args: &Args) -> u8 {
-    #[cfg(unix)]
-    interrupt::keep_ignoring_hangups();
     let done = match &args.command {
         #[cfg(feature = "simulation")]
         Command::Demo(demo) => commands::demo::run(demo),

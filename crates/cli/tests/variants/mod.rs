@@ -151,9 +151,11 @@ impl Variant {
                 .unwrap_or_else(|| refused(&sdg(&["detect", "--grasp-model", model, &photo])));
         }
         let mut input = marks;
+        // Not below the variant's folder, whose data.yaml has other labels.
+        let steps = tempfile::tempdir().unwrap();
         for (idx, format) in self.marks.through.iter().chain(&["coco"]).enumerate() {
             // Each step has its own folder for its data.yaml.
-            let step = at(&format!("step {idx}"));
+            let step = steps.path().join(format!("step {idx}"));
             fs::create_dir(&step).unwrap();
             let output = step.join("marks").display().to_string();
             let done = sdg(&["annotation", "convert", "--format", format, "--image", &photo, &input, &output]);
