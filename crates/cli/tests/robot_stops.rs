@@ -74,11 +74,16 @@ impl Moving {
     }
 }
 
-/// Joint positions in rad, and the mode.
-fn state(simulated: &Simulated) -> (Vec<f64>, String) {
+/// The output of `sdg robot state --json`.
+fn state_line(simulated: &Simulated) -> Value {
     let output = sdg(&["robot", "state", "--robot", &simulated.address, "--json"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let line: Value = serde_json::from_slice(&output.stdout).unwrap();
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Joint positions in rad, and the mode.
+fn state(simulated: &Simulated) -> (Vec<f64>, String) {
+    let line = state_line(simulated);
     let joints = line["joints_rad"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
     (joints, line["mode"].as_str().unwrap().to_owned())
 }
@@ -124,6 +129,20 @@ fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it()
     assert_eq!(refused.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("nothing moves until a person has checked the arm and recovers it: "), "{stderr}");
     assert!(stderr.contains("; sdg robot recover recovers it"), "{stderr}");
+
+    // Nor does the hand move, and the record of the failure is kept.
+    let opening_m = || state_line(&simulated)["hand"]["opening_m"].as_f64().unwrap();
+    let before_m = opening_m();
+    fs::write(&states, "the failure").unwrap();
+    let to_states = ["--states", states.to_str().unwrap()];
+    for hand in [&["open", "--width-mm", "20"][..], &["close"], &["home", "--hand", "--yes"]] {
+        let refused = sdg(&[&["robot"], hand, &["--robot", &simulated.address], &to_states].concat());
+        let stderr = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(1), "{hand:?}: {stderr}");
+        assert!(stderr.contains("nothing moves until a person has checked the arm"), "{hand:?}: {stderr}");
+        assert_eq!(fs::read_to_string(&states).unwrap(), "the failure", "{hand:?}");
+        assert!((opening_m() - before_m).abs() < 1e-4, "{hand:?}");
+    }
 
     // Without a terminal, there is no consent.
     let recover = ["robot", "recover", "--robot", &simulated.address];

@@ -43,7 +43,8 @@ pub trait Arm {
     /// Starts a motion of the hand, which runs in parallel with the arm's.
     ///
     /// # Errors
-    /// [`RobotError::Hand`] if the hand refuses the command.
+    /// [`RobotError::Hand`] if the hand refuses the command; [`RobotError::Latched`] or [`RobotError::Stopped`] if the
+    /// arm reports that it was stopped.
     fn start_hand(&mut self, command: HandCommand) -> Result<(), RobotError>;
 
     /// Waits until the hand has finished its command.

@@ -5,6 +5,7 @@ use std::error::Error;
 use sdg_kinematics::KinematicsError;
 use sdg_kinematics::planning::PlanError;
 
+use crate::arm_state::ArmMode;
 use crate::safety::Violation;
 use crate::watch::StopReason;
 
@@ -69,6 +70,16 @@ pub enum RobotError {
 }
 
 impl RobotError {
+    /// The error of a motion that is refused before it begins, because nothing moves in this mode.
+    pub(crate) fn in_mode(mode: ArmMode) -> Self {
+        match mode {
+            ArmMode::Reflex => {
+                Self::Latched("the arm is in reflex, after a contact or a command that it could not follow".to_owned())
+            }
+            mode => Self::Stopped(StopReason::Mode(mode)),
+        }
+    }
+
     /// Whether the arm was, or may have been, in motion. After such an error nothing moves until a person allows it.
     pub fn latches(&self) -> bool {
         !matches!(

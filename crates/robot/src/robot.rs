@@ -10,7 +10,7 @@ use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandS
 use crate::error::{Result, RobotError};
 use crate::safety::{FeltBelow, LimitsFrom, SafetyLimits, Violation};
 use crate::touch::{TouchDown, Touched};
-use crate::watch::{StopReason, Watch};
+use crate::watch::Watch;
 
 /// Largest distance of a motion's start from the controller's reference, rad; a distance this small is not visible.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
@@ -286,10 +286,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         let state = self.state()?;
         match state.mode {
             ArmMode::Idle | ArmMode::Moving => Ok(state),
-            ArmMode::Reflex => Err(RobotError::Latched(
-                "the arm is in reflex, after a contact or a command that it could not follow".to_owned(),
-            )),
-            mode => Err(RobotError::Stopped(StopReason::Mode(mode))),
+            mode => Err(RobotError::in_mode(mode)),
         }
     }
 

@@ -97,9 +97,18 @@ impl FrankaArm {
     /// Finds the fingers' range; needed once after the hand was switched on.
     ///
     /// # Errors
-    /// [`RobotError::Hand`].
+    /// [`RobotError::Hand`], and as for [`Arm::start_hand`] after a stop of the arm.
     pub fn home_hand(&mut self) -> Result<()> {
+        self.check_hand_may_move()?;
         self.hand.home()
+    }
+
+    /// Fails after a stop of the arm. The hand alone would move, and release a held part.
+    fn check_hand_may_move(&mut self) -> Result<()> {
+        match self.state()?.mode {
+            ArmMode::Idle | ArmMode::Moving | ArmMode::Guiding => Ok(()),
+            mode => Err(RobotError::in_mode(mode)),
+        }
     }
 
     fn error(&self, error: FciError) -> RobotError {
@@ -224,6 +233,7 @@ impl Arm for FrankaArm {
     }
 
     fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        self.check_hand_may_move()?;
         self.hand.start(command)
     }
 
