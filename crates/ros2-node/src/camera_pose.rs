@@ -39,6 +39,17 @@ struct Known {
     sent: Option<Result<PinholeCamera, String>>,
 }
 
+impl Known {
+    /// Checks that a received camera_info is of the camera in a file. With a camera file, neither a missing nor an
+    /// unreadable camera_info matters.
+    fn check(&self, of_file: &PinholeCamera) -> Result<(), RosError> {
+        match &self.sent {
+            Some(Ok(sent)) => camera_info::check_same_camera(of_file, sent),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Receives tf and camera_info on threads.
 pub(super) struct CameraPoseReader {
     source: CameraPoseSource,
@@ -101,6 +112,14 @@ impl CameraPoseReader {
         Ok(())
     }
 
+    /// Checks that a received camera_info is of the camera in a file, from which a grasp gets its intrinsics.
+    ///
+    /// # Errors
+    /// [`RosError::CameraInfo`] with the first difference.
+    pub(super) fn check(&self, of_file: &PinholeCamera) -> Result<(), RosError> {
+        lock(&self.known).check(of_file)
+    }
+
     /// The camera and its pose above the table at the time of a picture; `None` for [`CameraPoseSource::Unknown`].
     pub(super) fn at(&self, header: &Header) -> Result<Option<CameraOverTable>, RosError> {
         let known = lock(&self.known);
@@ -108,19 +127,15 @@ impl CameraPoseReader {
         match &self.source {
             CameraPoseSource::Unknown => Ok(None),
             CameraPoseSource::File(over_table) => {
-                // With a camera file, an unreadable camera_info does not matter.
-                if let Some(Ok(sent)) = &known.sent {
-                    camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
-                }
+                known.check(&over_table.camera.intrinsics)?;
                 Ok(Some(*over_table))
             }
             CameraPoseSource::Transforms { base_frame, table_height_m, intrinsics } => {
                 let intrinsics = match (intrinsics, &known.sent) {
-                    (Some(of_file), Some(Ok(sent))) => {
-                        camera_info::check_same_camera(of_file, sent)?;
+                    (Some(of_file), _) => {
+                        known.check(of_file)?;
                         *of_file
                     }
-                    (Some(of_file), _) => *of_file,
                     (None, Some(Ok(sent))) => *sent,
                     (None, Some(Err(why))) => return Err(refused("a usable camera_info", why.clone())),
                     (None, None) => return Err(refused("a camera_info with the pictures", "none yet".to_owned())),
@@ -143,5 +158,26 @@ impl Drop for CameraPoseReader {
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_info_of_another_camera_is_refused_also_without_a_source_of_poses() {
+        let check = |sent: Option<Result<PinholeCamera, String>>| {
+            let known = Arc::new(Mutex::new(Known { transforms: Transforms::new(0.5), sent }));
+            let source = CameraPoseSource::Unknown;
+            CameraPoseReader { source, known, is_stopped: Arc::default(), threads: Vec::new() }
+                .check(&PinholeCamera::WRIST)
+        };
+        for sent in [None, Some(Err("unreadable".to_owned())), Some(Ok(PinholeCamera::WRIST))] {
+            check(sent).unwrap();
+        }
+        let other = PinholeCamera { fx: 600.0, ..PinholeCamera::WRIST };
+        let error = check(Some(Ok(other))).unwrap_err().to_string();
+        assert_eq!(error, "camera_info: expected fx = 550.0 ± 6.4 px, as in the camera file, found 600.0");
     }
 }

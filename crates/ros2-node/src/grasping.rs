@@ -16,6 +16,7 @@ use sdg_robot::{
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
 
+use crate::camera_pose::CameraPoseReader;
 use crate::pictures::Shared;
 use crate::settings::IsInterrupted;
 
@@ -95,8 +96,14 @@ impl Grasping {
     /// Begins a grasp.
     ///
     /// # Errors
-    /// An error if motions are blocked, the speed is invalid, the model has no lengths, or the arm is lost.
-    pub(super) fn begin(&mut self, request: &GraspRequest, model: &GraspModel) -> Result<()> {
+    /// An error if motions are blocked, the speed is invalid, the model has no lengths, the pictures are from another
+    /// camera, or the arm is lost.
+    pub(super) fn begin(
+        &mut self,
+        request: &GraspRequest,
+        model: &GraspModel,
+        camera_pose: &CameraPoseReader,
+    ) -> Result<()> {
         if let Some(why) = &self.latched {
             anyhow::bail!("nothing moves until a person has checked the arm and restarts the node: {why}");
         }
@@ -105,6 +112,7 @@ impl Grasping {
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }
+        camera_pose.check(&self.settings.camera.intrinsics)?;
         let camera = self.settings.camera.with_marks_at(model, self.settings.told.as_ref());
         let config = GraspConfig {
             height: height_measurement(model, &camera, self.settings.told),

@@ -14,6 +14,7 @@ use sdg_ros2::messages::{
     TriggerResponse,
 };
 
+use crate::camera_pose::CameraPoseReader;
 use crate::grasping::Grasping;
 use crate::lines::Lines;
 use crate::searching::Searched;
@@ -143,10 +144,15 @@ impl Services {
 
     /// Receives requests and sends finished responses. Returns a taught model that is to be used, whose client
     /// [`Self::answer_use`] answers.
-    pub(super) fn work(&mut self, topic: &str, model: Option<&sdg_grasp::GraspModel>) -> Option<Taught> {
+    pub(super) fn work(
+        &mut self,
+        topic: &str,
+        model: Option<&sdg_grasp::GraspModel>,
+        camera_pose: &CameraPoseReader,
+    ) -> Option<Taught> {
         self.take_detections();
         self.give_up_detections(topic);
-        self.take_grasps(model);
+        self.take_grasps(model, camera_pose);
         self.take_teachings();
         self.finish_teaching()
     }
@@ -198,7 +204,7 @@ impl Services {
         self.detect.answer(asker, answer, found, message, &self.lines);
     }
 
-    fn take_grasps(&mut self, model: Option<&sdg_grasp::GraspModel>) {
+    fn take_grasps(&mut self, model: Option<&sdg_grasp::GraspModel>, camera_pose: &CameraPoseReader) {
         let Some((pair, grasping)) = &mut self.grasp else { return };
         for (asker, request) in pair.requests(&self.lines) {
             let begun = match (request, model, self.grasping.is_some()) {
@@ -208,7 +214,7 @@ impl Services {
                 }
                 (_, _, true) => Err("a grasp is already running".to_owned()),
                 (Ok(request), Some(model), false) => {
-                    grasping.begin(&request, model).map_err(|error| format!("{error:#}"))
+                    grasping.begin(&request, model, camera_pose).map_err(|error| format!("{error:#}"))
                 }
             };
             match begun {
