@@ -34,17 +34,21 @@ pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
 /// Number of angles that are tried for a part with full rotational symmetry: every 15°, which includes both axes of a
 /// tray and its diagonals.
 const NUM_TURNS: u32 = 24;
+/// Maximum number of angles that are tried for a part with another symmetry.
+const MAX_TURNS: u32 = 36;
 /// Allowance for the rounding of lengths, m.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Angles by which the part can be rotated without visible change, rad.
+/// Angles by which the part can be rotated without visible change, rad; at most [`MAX_TURNS`], over the whole circle.
 pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
-    let num = match symmetry {
-        RotationalSymmetry::Fold(count) => count.clamp(1, 36),
-        RotationalSymmetry::Full => NUM_TURNS,
+    let count = match symmetry {
+        RotationalSymmetry::Fold(count) => u64::from(count.max(1)),
+        RotationalSymmetry::Full => u64::from(NUM_TURNS),
         _ => 1,
     };
-    (0..num).map(|turn| TAU * f64::from(turn) / f64::from(num)).collect()
+    let num = count.min(u64::from(MAX_TURNS));
+    // Of many equivalent angles some are left out. All others are multiples of the same period.
+    (0..num).map(|turn| TAU * (turn * count / num) as f64 / count as f64).collect()
 }
 
 /// Opening of the hand that releases a part, m.

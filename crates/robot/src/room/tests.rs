@@ -1,6 +1,7 @@
 use super::*;
 use crate::place::{Place, PlaceKind};
 use nalgebra::Point2;
+use sdg_geometry::Angle;
 use sdg_kinematics::ArmGeometry;
 
 /// Opening of the fingers beyond the part for releasing it, m.
@@ -28,6 +29,22 @@ fn bar() -> PartShape {
 fn check(pitch_mm: [f64; 2], part: &PartShape, symmetry: RotationalSymmetry) -> Result<()> {
     // A cell with neighbours on all sides, in a rotated tray: the tray's own axes count.
     tray(pitch_mm, 0.7).goal(6).unwrap().check_room(part, symmetry, MARGIN_M, &ArmGeometry::panda().hand)
+}
+
+#[test]
+fn all_angles_of_a_symmetry_are_equivalent() {
+    for count in 2..=360 {
+        let (symmetry, turns_rad) = (RotationalSymmetry::Fold(count), same_turns_rad(RotationalSymmetry::Fold(count)));
+        assert_eq!(turns_rad.len(), count.min(36) as usize, "{count}");
+        for (turn, &turn_rad) in turns_rad.iter().enumerate() {
+            let visible_rad = symmetry.visible(Angle::from_radians(turn_rad)).radians();
+            assert!(visible_rad.abs() < 1e-9, "{count}: {turn_rad} looks rotated by {visible_rad}");
+            // The angles are different, and spread over the whole circle.
+            let even_rad = TAU * turn as f64 / turns_rad.len() as f64;
+            assert!((turn_rad - even_rad).abs() < TAU / f64::from(count), "{count}: {turn_rad}, near {even_rad}");
+        }
+        assert!(turns_rad.is_sorted_by(|one, next| one < next), "{count}: {turns_rad:?}");
+    }
 }
 
 #[test]
