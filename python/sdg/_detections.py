@@ -51,7 +51,8 @@ class Detection:
     polygon: list[tuple[float, float]]
     """The outline's corners, in pixels."""
     jaws_touch: list[int]
-    """Indices, among all detections of the picture by score, of accepted parts that the jaws would touch."""
+    """Indices of the accepted parts that the jaws would touch: among all detections of the picture by score, or, of a
+    tracked part, in the list of its frame."""
     record: dict[str, Any] = field(repr=False)
     """The record of `sdg detect --json`, with all digits; it lacks only `advice`, which names options of the program."""
 

@@ -203,6 +203,12 @@ def test_a_tracker_follows_the_part(shape_model: sdg.GraspModel) -> None:
     assert parts[0].grasp.x - first.grasp.x == pytest.approx(9, abs=0.5)
 
 
+def test_a_tracker_tells_which_parts_the_jaws_would_touch(shape_model: sdg.GraspModel) -> None:
+    with sdg.Tracker(shape_model, search_frames=1) as tracker:
+        parts = tracker.frame(made_pictures.touching(), captured_s=0.0)
+    assert [part.jaws_touch for part in parts] == [[1], [0]]
+
+
 def test_evaluation_counts_as_the_program_does(
     models: dict[str, Path], sdg_program: Path, pictures: dict[str, Path], tmp_path: Path
 ) -> None:

@@ -4,9 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
-use sdg_cell::{Found, FoundRecord, LiveTracker, Perception, SearchTime, track_state_name};
-use sdg_grasp::TrackerConfig;
-use serde::Serialize;
+use sdg_cell::{Found, FoundRecord, LiveTracker, PartRecord, Perception, SearchTime, track_state_name};
+use sdg_grasp::{GraspDetection, TrackedPart, TrackerConfig};
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
@@ -18,15 +17,6 @@ pub struct Tracker {
     tracker: LiveTracker,
     threads: Option<usize>,
     last_secs: f64,
-}
-
-#[derive(Serialize)]
-struct Record {
-    #[serde(flatten)]
-    found: FoundRecord,
-    track: u64,
-    state: &'static str,
-    age_s: f64,
 }
 
 impl Tracker {
@@ -66,13 +56,16 @@ impl Tracker {
         let tracker = &mut self.tracker;
         let parts = on_threads(self.threads, || tracker.frame(Arc::new(picture), captured))??;
         self.last_secs = captured_secs;
-        let record = |part: sdg_grasp::TrackedPart| Record {
-            track: part.id,
-            state: track_state_name(part.state),
-            age_s: part.age.as_secs_f64(),
+        let detections: Vec<&GraspDetection> = parts.iter().map(|part| &part.detection).collect();
+        let touched = self.perception.touched_among_accepted(&detections, |idx| parts[idx].is_followed());
+        let record = |(part, jaws_touch): (TrackedPart, Vec<usize>)| PartRecord {
+            track: Some(part.id),
+            state: Some(track_state_name(part.state)),
+            age_s: Some(part.age.as_secs_f64()),
             found: FoundRecord::new(&Found { detection: part.detection, pose: part.pose }, &self.perception),
+            jaws_touch,
         };
-        let records: Vec<Record> = parts.into_iter().map(record).collect();
+        let records: Vec<PartRecord> = parts.into_iter().zip(touched).map(record).collect();
         Ok(serde_json::to_string(&records).unwrap_or_default())
     }
 }
