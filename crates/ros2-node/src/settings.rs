@@ -19,8 +19,7 @@ pub struct Settings {
     pub device: Device,
     /// Source of the camera's pose.
     pub camera_pose: CameraPoseSource,
-    /// Maximum difference between the stamps of picture and transform, in seconds, if the picture is not between two
-    /// transforms.
+    /// Maximum difference between the stamps of picture and nearest transform, in seconds.
     pub max_transform_age_secs: f64,
     /// Minimum score of published detections.
     pub min_score: f64,

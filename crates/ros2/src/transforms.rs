@@ -46,8 +46,8 @@ fn frame(name: &str) -> &str {
 }
 
 impl Transforms {
-    /// Starts without transforms. At a time outside the stored history of a moving frame, the nearest pose is used if
-    /// its time differs by at most `max_age_secs`.
+    /// Starts without transforms. A pose of a moving frame is interpolated between two known ones, and outside the
+    /// stored history it is the nearest one. The time of the nearest one differs by at most `max_age_secs`.
     pub fn new(max_age_secs: f64) -> Self {
         Self { frames: HashMap::new(), max_age_secs }
     }
@@ -152,6 +152,9 @@ impl Transforms {
         match (after.checked_sub(1).and_then(|before| poses.get(before)), poses.get(after)) {
             (Some((from, pose)), Some((to, next))) => {
                 let share = (secs - from) / (to - from);
+                if let Some(why) = stale(if share < 0.5 { *from } else { *to }) {
+                    return Err(why);
+                }
                 let between = pose.try_lerp_slerp(next, share, 1e-9);
                 Ok(between.unwrap_or(if share < 0.5 { *pose } else { *next }))
             }
@@ -220,6 +223,13 @@ mod tests {
         assert!(transforms.lookup("base", "camera", at(9.0)).unwrap_err().to_string().contains("after the picture"));
         let error = transforms.lookup("base", "lidar", at(10.0)).unwrap_err().to_string();
         assert!(error.contains("no transform of \"lidar\" was received"), "{error}");
+        // Between two poses, the nearer one counts.
+        let mut gap = Transforms::new(0.5);
+        gap.add(&transform("base", "hand", 0.0, along(1.0, 0.0)), false);
+        gap.add(&transform("base", "hand", 9.0, along(3.0, 0.0)), false);
+        assert!(gap.lookup("base", "hand", at(0.4)).is_ok() && gap.lookup("base", "hand", at(8.6)).is_ok());
+        let error = gap.lookup("base", "hand", at(4.5)).unwrap_err().to_string();
+        assert!(error.contains("4.50 s after the picture, at most 0.50 s are allowed"), "{error}");
         let mut apart = known();
         apart.add(&transform("map", "odom", 0.0, along(0.0, 0.0)), true);
         assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("frames are not connected"));
