@@ -96,5 +96,9 @@ def test_the_command_is_there(models: dict[str, Path], pictures: dict[str, Path]
     missing = subprocess.run([*run, str(tmp_path / "missing.png")], capture_output=True, text=True)
     assert missing.returncode == 1
     assert missing.stderr.startswith("sdg: ") and missing.stderr.count("\n") == 1
+    for not_built in (["demo"], ["simulate", "--fci"]):
+        done = subprocess.run([str(command), *not_built], capture_output=True, text=True)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+        assert "built without the simulator" in done.stderr, done.stderr
     wrong = subprocess.run([str(command), "detect", "--no-such-option"], capture_output=True, text=True)
     assert wrong.returncode == 2

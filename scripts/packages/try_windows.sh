@@ -30,7 +30,7 @@ sh "$OLDPWD/scripts/packages/first_grasp.sh" "$work/sdg" "$folder/photos" . 2>&1
 echo "windows: from unpacking to the grasp drawn on a photo, under $("$wine" --version): $(echo "$(date +%s.%N) - $start" | bc | cut -c 1-5) s"
 
 # A missing command is reported in one line.
-for verb in "demo" "camera grab --from v4l:/dev/video0 --out picture.png"; do
+for verb in "demo" "simulate --fci" "camera grab --from v4l:/dev/video0 --out picture.png"; do
     told=$("$work/sdg" $verb 2>&1) && { echo "windows: $verb did not fail" >&2; exit 1; }
     [ "$(wc -l <<<"$told")" = 1 ] || { echo "windows: $verb said: $told" >&2; exit 1; }
     echo "windows: sdg $verb: $told"

@@ -50,6 +50,9 @@ pub enum Command {
     /// Serve a simulated robot on the network to other programs
     #[cfg(feature = "simulation")]
     Simulate(crate::commands::simulate::SimulateArgs),
+    /// A simulated robot; not in this build, which lacks cargo's feature "simulation"
+    #[cfg(not(feature = "simulation"))]
+    Simulate(NotBuiltArgs),
     /// Evaluate every model on every part by the paper's protocol, or test a model on your own labelled pictures
     Evaluate(Box<EvaluateArgs>),
     /// Grasp a part with a real or a simulated arm, from the picture to the lifted part
@@ -59,7 +62,7 @@ pub enum Command {
     Ros2(Box<crate::commands::ros2::args::Ros2Args>),
     /// A ROS 2 node; not in this build, which lacks cargo's feature "ros2"
     #[cfg(not(feature = "ros2"))]
-    Ros2(WithoutRos2Args),
+    Ros2(NotBuiltArgs),
     /// Plan a motion around the obstacles of a workcell and draw it; nothing moves
     Plan(PlanArgs),
     /// Draw a workcell from above, with the area of the table that the arm reaches
@@ -85,10 +88,10 @@ pub enum Command {
     Devices(DevicesArgs),
 }
 
-/// Accepts any arguments of `sdg ros2` in a build without ROS 2; the command then fails with an error that says so.
-#[cfg(not(feature = "ros2"))]
+/// Accepts any arguments of a command that is not in this build; the command then fails with an error that says so.
+#[cfg(not(all(feature = "ros2", feature = "simulation")))]
 #[derive(Debug, clap::Args)]
-pub struct WithoutRos2Args {
+pub struct NotBuiltArgs {
     /// Ignored.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     arguments: Vec<String>,
@@ -121,6 +124,7 @@ mod tests {
             "sdg teach --demo a.png --demo b.png:b.json --out m.sdg",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg rehearse --grasp-model m.sdg --height-mm 12 --length-mm 85 --mass-g 60 --friction 0.4",
+            "sdg simulate --fci --lockstep --port 1400",
             "sdg augment --held-back --demo a.png --count 40 --out samples",
             "sdg evaluate",
             "sdg evaluate --models B,C --objects pendulum,rod_end --attempts 2 --seed 3 --out d --report r --json",

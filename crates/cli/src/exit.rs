@@ -47,8 +47,8 @@ impl std::error::Error for Usage {}
 /// The error of a command that needs the simulator, in a build without it.
 #[cfg(not(feature = "simulation"))]
 pub fn without_simulator() -> anyhow::Error {
-    let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (except for --pictures) need: \
-                 expected a build with cargo's feature \"simulation\"";
+    let needs = "this sdg was built without the simulator, which demo, rehearse, simulate and evaluate (except for --pictures) \
+                 need: expected a build with cargo's feature \"simulation\"";
     Usage(needs.to_owned()).into()
 }
 

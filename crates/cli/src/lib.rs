@@ -96,7 +96,7 @@ pub fn run(args: &Args) -> u8 {
         #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
         #[cfg(not(feature = "simulation"))]
-        Command::Demo(_) | Command::Rehearse(_) => Err(exit::without_simulator()),
+        Command::Demo(_) | Command::Rehearse(_) | Command::Simulate(_) => Err(exit::without_simulator()),
         #[cfg(feature = "simulation")]
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
