@@ -13,7 +13,8 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import inf
 from os import PathLike, fspath
 from operator import index
@@ -305,7 +306,7 @@ def teach(
     pairs = {"": (photo, marks)}
     for number, demo in enumerate(_list("more_demos", more_demos)):
         pairs[f"more_demos[{number}] "] = _pair("more_demos of pairs (photo, marks)", demo)
-    with tempfile.TemporaryDirectory() as folder:
+    with _temporary_folder(any(isinstance(of_marks, Mapping) for _, of_marks in pairs.values())) as folder:
         demonstrations: list[tuple[_Path, _Path]] = []
         for number, (where, (of_photo, of_marks)) in enumerate(pairs.items()):
             of_photo = _path(f"{where}photo", of_photo)
@@ -327,6 +328,8 @@ def teach(
                 [_path("negatives", path) for path in _list("negatives", negatives)],
             )
         except SdgError as error:
+            if not folder:
+                raise
             # The caller does not know the files in this folder.
             raise type(error)(re.sub(rf"{re.escape(folder)}/\d+/(.*?)\.json", r"\1", str(error))) from None
     return GraspModel(taught)
@@ -348,7 +351,9 @@ def evaluate(
 
     Raises TeachingError for invalid labels, and the exceptions of `GraspModel.detect`.
     """
-    with tempfile.TemporaryDirectory() as unkept:
+    if label is not None and not isinstance(label, str):
+        raise ArgumentError(f"expected label, a string, found {_type(label)}")
+    with _temporary_folder(report is None) as unkept:
         figures: dict[str, Any] = json.loads(
             _native.evaluate(
                 _native_model(model),
@@ -358,12 +363,26 @@ def evaluate(
                 _checked_threads(threads),
                 label,
                 _number("min_score", min_score, 0, 1),
-                _path("report", report) if report is not None else unkept,
+                _path("report", unkept if report is None else report),
             )
         )
     if report is None:
         del figures["report"]
     return figures
+
+
+@contextmanager
+def _temporary_folder(is_needed: bool) -> Iterator[str]:
+    """A temporary folder, which the system may refuse; "" if none is needed."""
+    if not is_needed:
+        yield ""
+        return
+    try:
+        folder = tempfile.TemporaryDirectory()
+    except OSError as error:
+        raise FileError(f"expected a folder for temporary files, found none: {error}") from None
+    with folder as path:
+        yield path
 
 
 def _type(value: object) -> str:
@@ -416,6 +435,8 @@ def _number(name: str, value: Any, least: float = -inf, most: float = inf) -> fl
             number = float(value)
         except (TypeError, ValueError):
             pass
+        except OverflowError:
+            raise ArgumentError(f"expected {name}, a number of at most 1.8e308, found a larger one") from None
     if number is None:
         raise ArgumentError(f"expected {name}, a number, found {value!r}")
     if not least <= number <= most and (least, most) != (-inf, inf):
@@ -437,8 +458,19 @@ def _file_of(marks: Mapping[str, Any], path: Path) -> Path:
             return value.tolist()
         raise ArgumentError(f"expected marks with the contents of a JSON file, found {_type(value)}")
 
-    path.parent.mkdir()
-    path.write_text(json.dumps(marks, default=plain), encoding="utf-8")
+    try:
+        text = json.dumps(marks, default=plain)
+    except SdgError:
+        raise
+    except (TypeError, ValueError, RecursionError) as error:
+        # For example, keys that are no strings, or a dictionary that contains itself.
+        raise ArgumentError(f"expected marks with the contents of a JSON file, found others: {error}") from None
+    try:
+        path.parent.mkdir()
+        path.write_text(text, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        # For example, a full disk, or a photo whose name is too long.
+        raise FileError(f"the marks cannot be written to a temporary file: {error}") from None
     return path
 
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any, Callable
 
@@ -12,6 +13,8 @@ import made_pictures
 import sdg
 
 GREY = np.zeros((480, 640, 3), np.uint8)
+CIRCULAR: dict[str, Any] = {}
+CIRCULAR["shapes"] = CIRCULAR
 
 
 class Subclass(np.ndarray):
@@ -95,6 +98,23 @@ def test_paths_that_do_not_exist(shape_model: sdg.GraspModel, tmp_path: Path) ->
         assert isinstance(raised.value, OSError)
 
 
+def test_temporary_files_that_cannot_be_written(
+    shape_model: sdg.GraspModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(sdg.FileError, match="marks cannot be written"):
+        sdg.teach("p" * 300, {"shapes": []}, model="S")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    # Without marks as a dictionary, no temporary file is needed.
+    assert sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, model="S").model == "S"
+    calls: list[Callable[[], object]] = [
+        lambda: sdg.teach(made_pictures.PHOTO, {"shapes": []}, model="S"),
+        lambda: sdg.evaluate(shape_model, tmp_path),
+    ]
+    for call in calls:
+        with pytest.raises(sdg.FileError, match="expected a folder for temporary files, found none: .*missing"):
+            call()
+
+
 def test_a_model_replaces_no_other_file(shape_model: sdg.GraspModel, tmp_path: Path) -> None:
     picture = tmp_path / "picture.png"
     picture.write_bytes(made_pictures.PHOTO.read_bytes())
@@ -145,6 +165,7 @@ def test_regions(region: Any, shape_model: sdg.GraspModel) -> None:
         ({"min_score": 1.5}, "min_score from 0 to 1, found 1.5"),
         ({"min_score": float("nan")}, "min_score from 0 to 1, found nan"),
         ({"min_score": "high"}, "expected min_score, a number, found 'high'"),
+        ({"min_score": 10**400}, "expected min_score, a number of at most 1.8e308"),
         ({"channels": None}, 'expected channels "rgb" or "bgr", found NoneType'),
     ],
 )
@@ -182,6 +203,8 @@ def test_arguments_of_detect(arguments: dict[str, Any], words: str, shape_model:
         {"photo": GREY},
         {"marks": None},
         {"marks": {"shapes": {1, 2}}},
+        {"marks": {("shapes",): []}},
+        {"marks": CIRCULAR},
     ],
 )
 def test_arguments_of_teach(arguments: dict[str, Any]) -> None:
@@ -199,6 +222,7 @@ def test_paths_and_objects_of_another_type(shape_model: sdg.GraspModel) -> None:
         lambda: sdg.Tracker(anything),
         lambda: sdg.evaluate(anything, "folder"),
         lambda: sdg.evaluate(shape_model, None),  # type: ignore[arg-type]
+        lambda: sdg.evaluate(shape_model, "folder", label=anything.encode()),
         lambda: sdg.GraspModel.load(None),  # type: ignore[arg-type]
         lambda: sdg.Camera.from_yaml(b""),  # type: ignore[arg-type]
         lambda: shape_model.save(None),  # type: ignore[arg-type]
