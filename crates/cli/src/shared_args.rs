@@ -165,11 +165,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a positive, finite number of seconds.
+/// Parses a positive number of seconds, at most 30 years: a `Duration` has a limit, too.
 pub fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(secs) if secs.is_finite() && secs > 0.0 => Ok(secs),
-        _ => Err("expected a positive number of seconds".to_owned()),
+        Ok(secs) if secs > 0.0 && secs <= 1e9 => Ok(secs),
+        _ => Err("expected a positive number of seconds, at most 1e9".to_owned()),
     }
 }
 
@@ -212,6 +212,14 @@ mod tests {
         assert!(found.iter().all(|error| error.ends_with("metres given as millimetres?")), "{found:?}");
         for text in ["-1", "501", "nan", "4 cm"] {
             assert!(height_mm(text).unwrap_err().ends_with(&format!("millimetres, found {text}")), "{text}");
+        }
+    }
+
+    #[test]
+    fn seconds_are_positive_and_limited() {
+        assert_eq!(["0.5", "1e9"].map(seconds), [Ok(0.5), Ok(1e9)]);
+        for text in ["0", "-1", "nan", "inf", "1e20", "2 s"] {
+            assert!(seconds(text).unwrap_err().ends_with("seconds, at most 1e9"), "{text}");
         }
     }
 
