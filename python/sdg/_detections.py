@@ -45,7 +45,7 @@ class Detection:
     evidence: dict[str, float]
     """The components of the score, in log-odds."""
     refused: Optional[str]
-    """Why it is refused; None if it is accepted."""
+    """The reason for a score below 0.5, in words; None for a higher score. It does not depend on `min_score`."""
     box: tuple[float, float, float, float]
     """Left, upper, right and lower edge, in pixels."""
     polygon: list[tuple[float, float]]
@@ -98,7 +98,7 @@ class Detections(list[Detection]):
     """The accepted detections of a picture, best score first."""
 
     refused: list[Detection]
-    """The other detections, best first."""
+    """The other detections, with a score below `min_score`, best first."""
 
     def __init__(self, found: list[Detection], min_score: float) -> None:
         super().__init__(one for one in found if one.score >= min_score)
