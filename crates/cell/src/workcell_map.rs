@@ -107,15 +107,18 @@ impl WorkcellMap {
         for place in &workcell.places {
             self.draw_place(&mut image, place, &mut labels);
         }
+        let arm = workcell.robot.geometry();
         for (index, look_out) in workcell.look_outs.iter().enumerate() {
-            if let LookOut::CameraAt { at_m, .. } = look_out {
-                let at = self.px(Point2::from(*at_m));
-                for (dx, dy) in [(7.0, 0.0), (0.0, 7.0)] {
-                    let [from, to] = [-1.0, 1.0].map(|s| Point2::new(at.x + s * dx, at.y + s * dy));
-                    draw_line(&mut image, from, to, &pen(LOOK, 2.0));
-                }
-                labels.add(Point2::new(at.x + 9.0, at.y - 4.0), &format!("look {}", index + 1), LOOK);
+            let at = self.px(match look_out {
+                LookOut::CameraAt { at_m, .. } => Point2::from(*at_m),
+                // The tcp, because the camera may be beside the robot.
+                LookOut::Joints(q) => Point2::from(arm.forward(q).translation.vector.xy()),
+            });
+            for (dx, dy) in [(7.0, 0.0), (0.0, 7.0)] {
+                let [from, to] = [-1.0, 1.0].map(|s| Point2::new(at.x + s * dx, at.y + s * dy));
+                draw_line(&mut image, from, to, &pen(LOOK, 2.0));
             }
+            labels.add(Point2::new(at.x + 9.0, at.y - 4.0), &format!("look {}", index + 1), LOOK);
         }
         labels.draw(&mut image);
         self.draw_key(&mut image, workcell, most);
@@ -189,12 +192,18 @@ impl WorkcellMap {
     fn draw_key(&self, image: &mut RgbImage, workcell: &Workcell, most: usize) {
         let mut x = FRAME_PX;
         let y = FRAME_PX + (self.y_m[1] - self.y_m[0]) * PX_PER_M + 52.0;
+        let is_tcp = |look_out: &LookOut| matches!(look_out, LookOut::Joints(_));
+        let at_look_out = match (workcell.look_outs.iter().all(is_tcp), workcell.look_outs.iter().any(is_tcp)) {
+            (true, _) => "tcp at a look-out",
+            (false, true) => "camera or tcp at a look-out",
+            (false, false) => "camera at a look-out",
+        };
         let mut entries = vec![
             ("reached (paler: at fewer angles of the hand)", REACHED),
             ("workspace", WORKSPACE),
             ("place", PLACE),
             ("obstacle", OBSTACLE),
-            ("camera at a look-out", LOOK),
+            (at_look_out, LOOK),
         ];
         if most == 0 {
             entries.remove(0);
@@ -249,4 +258,24 @@ impl Labels {
 
 fn pen(color: Color, width: f64) -> Pen {
     Pen::new(color).width(width).without_halo()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_kinematics::JointVector;
+
+    #[test]
+    fn look_outs_by_joints_are_drawn_at_the_tcp() {
+        let shipped = include_str!("../../../datasets/workcell/workcell.toml");
+        let joints_deg = [50.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0];
+        let head = shipped.split("[[look_out]]").next().unwrap();
+        let workcell = Workcell::from_toml(&format!("{head}[[look_out]]\njoints_deg = {joints_deg:?}\n")).unwrap();
+        let reach = Reach::of(&workcell, [[0.4, 0.5], [0.0, 0.1]], 0.1, 0.02).unwrap();
+        let map = WorkcellMap::around(&workcell);
+        let tcp_m = workcell.robot.geometry().forward(&JointVector::from(joints_deg.map(f64::to_radians))).translation;
+        let at = map.px(Point2::new(tcp_m.x, tcp_m.y));
+        let found = map.draw(&workcell, &reach).get_pixel(at.x as u32, at.y as u32).0;
+        assert!((0..3).all(|k| found[k].abs_diff(LOOK.0[k]) < 12), "{found:?} at {at}");
+    }
 }
