@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
+use sdg_files::AtomicFile;
+
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 
@@ -14,16 +16,9 @@ pub fn token_of_file(path: &Path) -> Result<String> {
     const MAX_BYTES: u64 = 4096;
     if !path.exists() {
         let token = new_token()?;
-        let mut options = std::fs::OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
-        written.map_err(|source| Error::File {
-            path: path.to_owned(),
-            action: "cannot write the token of the page",
-            source,
-        })?;
+        let mut file = AtomicFile::create_private(path)?;
+        writeln!(file.as_file(), "{token}").map_err(Error::file(path, "cannot write the token of the page"))?;
+        file.commit()?;
         return Ok(token);
     }
     let text = String::from_utf8_lossy(&sdg_files::read(path, MAX_BYTES)?).trim().to_owned();

@@ -36,6 +36,19 @@ impl AtomicFile {
     /// # Errors
     /// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder is missing or read-only.
     pub fn create(path: &Path) -> Result<Self> {
+        // The permissions that other programs request; the umask removes the rest.
+        Self::with_mode(path, 0o666)
+    }
+
+    /// As [`Self::create`], for a file that on Unix only its owner may read.
+    ///
+    /// # Errors
+    /// As for [`Self::create`].
+    pub fn create_private(path: &Path) -> Result<Self> {
+        Self::with_mode(path, 0o600)
+    }
+
+    fn with_mode(path: &Path, mode: u32) -> Result<Self> {
         let not_a_file = |found| FileError::NotAFile { path: path.to_owned(), found };
         if path.file_name().is_none() {
             return Err(not_a_file("no file name"));
@@ -49,7 +62,7 @@ impl AtomicFile {
         if target.exists() && !target.is_file() {
             return Err(not_a_file("a device or a pipe"));
         }
-        let file = temporary_beside(&target).map_err(failed(path, "creating a temporary file in its folder"))?;
+        let file = temporary_beside(&target, mode).map_err(failed(path, "creating a temporary file in its folder"))?;
         Ok(Self { path: path.to_owned(), target, file })
     }
 
@@ -76,13 +89,13 @@ fn failed(path: &Path, step: &'static str) -> impl FnOnce(io::Error) -> FileErro
     move |source| FileError::Write { path, step, source }
 }
 
-/// A file in the folder of `target`, with the permissions that new files have; deleted when it goes out of scope.
-fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
+/// A file in the folder of `target`, with the permissions `mode` on Unix; deleted when it goes out of scope.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "other systems have no such permissions"))]
+fn temporary_beside(target: &Path, mode: u32) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sdg-").suffix(".tmp");
     #[cfg(unix)]
-    // The permissions that other programs request; the umask removes the rest.
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
     builder.tempfile_in(folder_of(target))
 }
 
