@@ -198,9 +198,9 @@ impl Session {
         pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
-    /// Makes a tried picture a demonstration with these marks, or with those in its file, which are not written over. A
-    /// picture from the page, or from another folder, is copied beside the first picture under an unused name: no marks
-    /// are written into other folders.
+    /// Makes a tried picture a demonstration with these marks, or with those that it has already, unless only the given
+    /// ones have a grasp. A picture from the page, or from another folder, is copied beside the first picture under an
+    /// unused name: no marks are written into other folders. If the photo that it became was removed, that is restored.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
@@ -211,10 +211,12 @@ impl Session {
         if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
-        let mut picture = trial.picture;
+        let copy = trial.became.map(|id| state.images[id].picture.clone());
+        let is_copied = copy.is_some();
+        let mut picture = copy.unwrap_or(trial.picture);
         picture.check_is_markable()?;
         let folder_of = |path: &Path| std::path::absolute(path).ok()?.parent().map(Path::to_owned);
-        if trial.uploaded || folder_of(&picture.path) != folder_of(&self.home) {
+        if !is_copied && (trial.uploaded || folder_of(&picture.path) != folder_of(&self.home)) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
