@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::model_versions::Version;
 use crate::names::{PROJECT_FILE, absolute, relative};
 use crate::picture::{Picture, pictures_in};
-use crate::region::Region;
+use crate::region::Searched;
 
 /// Folder of pictures added on the page.
 pub const TRIED_FOLDER: &str = "tried";
@@ -132,15 +132,6 @@ pub struct ProjectFile {
     /// The searched region of pictures; `None` in files without this field: the region of the model in use applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub searched: Option<Searched>,
-}
-
-/// The searched region of pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Searched {
-    /// The whole picture, whatever the model's file says.
-    All,
-    Part(Region),
 }
 
 /// A picture that a model was tried on, with the user's statements on it.

@@ -13,8 +13,8 @@ use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::{absolute, file_name, relative};
 use crate::picture::Picture;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried};
-use crate::region::Region;
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Tried};
+use crate::region::{Region, Searched};
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
 /// The note on a picture that keeps the marks that it had before it was added.
@@ -216,7 +216,7 @@ impl State {
             removed: self.removed_earlier.clone(),
             models: self.models.versions.clone(),
             current_model: self.models.current,
-            searched: Some(self.region.map_or(Searched::All, Searched::Part)),
+            searched: Some(Searched::of(self.region)),
             ..ProjectFile::default()
         };
         for id in self.trial_ids() {

@@ -11,6 +11,7 @@ use crate::marks::Marks;
 use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
 use crate::project_file::MAX_TRIAL_PICTURES;
+use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
@@ -123,7 +124,7 @@ impl Session {
     /// The detections of two model versions in every picture to try, in the current search region.
     ///
     /// # Errors
-    /// Unknown version, or a version's file cannot be read.
+    /// Unknown version, a version's file cannot be read, or a version cannot search the region.
     pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
         let (models, pictures, region) = {
             let state = self.state();
@@ -132,11 +133,10 @@ impl Session {
             let pictures: Vec<_> = state.trial_ids().map(tried).collect();
             ([read(one)?, read(other)?], pictures, state.region)
         };
-        let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
+        let searched = Some(Searched::of(region));
+        let [one, other] =
+            models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary, searched).map_err(Error::Teacher));
         let models = [one?, other?];
-        for model in &models {
-            model.look_in(region).map_err(Error::Teacher)?;
-        }
         let compare = |trial: &TrialPicture| {
             let pixels = trial.picture.pixels()?;
             let found = |model: &dyn TaughtModel| {
