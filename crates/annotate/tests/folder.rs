@@ -146,11 +146,14 @@ fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos
     // Marked in the folder, such a photo is refused for its orientation and not for the size that its marks name.
     let folder = folder_of(&[]);
     std::fs::write(folder.path().join("turned.png"), turned_png(6)).unwrap();
-    std::fs::write(folder.path().join("turned.json"), LABELME).unwrap();
-    let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
-    let options = SessionOptions { project, pixel_frame, ..SessionOptions::default() };
-    let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
-    assert!(refused.contains("Exif"), "{refused}");
+    let upright = LABELME.replace(r#""imageWidth": 200, "imageHeight": 100"#, r#""imageWidth": 100, "imageHeight": 200"#);
+    for marks in [LABELME, &upright] {
+        std::fs::write(folder.path().join("turned.json"), marks).unwrap();
+        let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
+        let options = SessionOptions { project, pixel_frame, ..SessionOptions::default() };
+        let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
+        assert!(refused.contains("Exif"), "{refused}");
+    }
 }
 
 #[test]
