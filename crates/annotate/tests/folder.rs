@@ -146,7 +146,8 @@ fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos
     // Marked in the folder, such a photo is refused for its orientation and not for the size that its marks name.
     let folder = folder_of(&[]);
     std::fs::write(folder.path().join("turned.png"), turned_png(6)).unwrap();
-    let upright = LABELME.replace(r#""imageWidth": 200, "imageHeight": 100"#, r#""imageWidth": 100, "imageHeight": 200"#);
+    let upright =
+        LABELME.replace(r#""imageWidth": 200, "imageHeight": 100"#, r#""imageWidth": 100, "imageHeight": 200"#);
     for marks in [LABELME, &upright] {
         std::fs::write(folder.path().join("turned.json"), marks).unwrap();
         let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
