@@ -7,10 +7,14 @@
 //!                          ─ log-odds that are subtracted from every score
 //! ```
 
+use std::ops::RangeInclusive;
+
 use image::{RgbImage, imageops};
 use sdg_demonstration::random::scramble;
-use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
-use sdg_geometry::{BoundingBox, percentile};
+use sdg_demonstration::{
+    Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle, output_size_of,
+};
+use sdg_geometry::{BoundingBox, PlanarSimilarity, percentile};
 
 use super::options::TeachOptions;
 use crate::decimal::decimal;
@@ -19,6 +23,7 @@ use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::taught::TaughtDemonstration;
+use crate::taught_marks::extent;
 
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
 /// hand, not measured.
@@ -34,6 +39,9 @@ const MARGIN: f64 = 0.2;
 const REFUSED_PERCENT: f64 = 10.0;
 /// Minimum IoU of a detection with a part of a held-out sample.
 const MIN_IOU: f64 = 0.5;
+/// Minimum width and height of the surroundings of the part that are cut out of a large plan view, in pixels. Chosen by
+/// hand.
+const MIN_SURROUNDINGS_PX: f64 = 1024.0;
 
 /// Samples made from pictures without the part.
 pub(super) struct AbsentSamples {
@@ -131,17 +139,64 @@ fn less_for(highest: f64, present: &[f64]) -> f64 {
 /// The best score on the part in each held-out sample, in log-odds; samples in which the part is not found are left
 /// out.
 fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<f64>> {
-    let sizes = model.held_out_sizes();
-    let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
-    style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
-    let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
-    let augmenter = Augmenter::new(demonstrations, config, options.seed)?;
+    let augmenter = augmenter(demonstrations, &model.held_out_sizes(), options)?;
     let mut found = Vec::new();
     for sample in (0..NUM_POSITIVES).map(|i| augmenter.held_out(FIRST_POSITIVE + i)) {
         let is_part = |bbox: &BoundingBox| sample.objects.iter().any(|object| object.bbox.iou(bbox) >= MIN_IOU);
         found.extend(best_log_odds(model, &sample.image, is_part)?);
     }
     Ok(found)
+}
+
+/// Makes the held-out samples. Those of a model of known size keep the scale of the plan view, because it finds no
+/// smaller part: of a plan view whose samples would be reduced, only the part's surroundings are used.
+fn augmenter(
+    demonstrations: &[Demonstration],
+    sizes: &RangeInclusive<f64>,
+    options: &TeachOptions,
+) -> Result<Augmenter> {
+    let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
+    style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
+    let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
+    let is_reduced = |demonstration: &Demonstration| {
+        let photo: [u32; 2] = demonstration.image.dimensions().into();
+        output_size_of(photo) != photo
+    };
+    if options.lengths.is_none() || !demonstrations.iter().any(is_reduced) {
+        return Ok(Augmenter::new(demonstrations, config, options.seed)?);
+    }
+    let parts = demonstrations.iter().map(|demonstration| extent_of(&demonstration.annotation));
+    let side = parts.map(|part| 2.0 * part.width().max(part.height())).fold(MIN_SURROUNDINGS_PX, f64::max);
+    let cut: Vec<_> = demonstrations.iter().map(|demonstration| surroundings(demonstration, side as u32)).collect();
+    Ok(Augmenter::new(&cut, config, options.seed)?)
+}
+
+fn extent_of(annotation: &Annotation) -> BoundingBox {
+    annotation.grasp.map_or(annotation.bbox, |grasp| extent(&annotation.bbox, &grasp))
+}
+
+/// The part's surroundings in the photo, `side` pixels wide and high, or as many as the photo has.
+fn surroundings(demonstration: &Demonstration, side: u32) -> Demonstration {
+    let Demonstration { image, annotation } = demonstration;
+    let center = extent_of(annotation).center();
+    let range = |center: f64, whole: u32| {
+        let length = side.min(whole);
+        let start = (center - 0.5 * f64::from(length)).round().clamp(0.0, f64::from(whole - length));
+        (start as u32, length)
+    };
+    let ((left, width), (top, height)) = (range(center.x, image.width()), range(center.y, image.height()));
+    let to_cut = PlanarSimilarity::translation(-f64::from(left), -f64::from(top));
+    let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
+    let [x1, x2] = [x1, x2].map(|x| x - f64::from(left));
+    let [y1, y2] = [y1, y2].map(|y| y - f64::from(top));
+    let annotation = Annotation {
+        label: annotation.label.clone(),
+        bbox: BoundingBox { x1, y1, x2, y2 },
+        grasp: annotation.grasp.map(|grasp| grasp.transformed(&to_cut)),
+        jaw_width: annotation.jaw_width,
+        outline: annotation.outline.as_ref().map(|outline| outline.transformed(&to_cut)),
+    };
+    Demonstration { image: imageops::crop_imm(image, left, top, width, height).to_image(), annotation }
 }
 
 /// The best score of the counted detections in a picture, in log-odds.
@@ -154,6 +209,7 @@ fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&Boundi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check_config::CheckConfig;
     use crate::facts::ModelKind;
     use crate::lengths::Lengths;
     use crate::teach::teach;
@@ -185,6 +241,31 @@ mod tests {
             assert!(sample.objects.is_empty());
         }
         assert_eq!(AbsentSamples::new(&[], [160, 120], 5).sample(11, [64, 48]), None);
+    }
+
+    #[test]
+    fn samples_of_known_size_keep_the_scale_of_a_large_plan_view() {
+        // The part in the middle of a view whose own samples would have two thirds of its width.
+        let Demonstration { image: small, mut annotation } = demonstration();
+        let left = 6000;
+        let mut image = RgbImage::from_pixel(12_000, small.height(), image::Rgb([60, 60, 70]));
+        imageops::replace(&mut image, &small, i64::from(left), 0);
+        let moved = PlanarSimilarity::translation(f64::from(left), 0.0);
+        annotation.grasp = annotation.grasp.map(|grasp| grasp.transformed(&moved));
+        annotation.outline = annotation.outline.map(|outline| outline.transformed(&moved));
+        annotation.bbox = annotation.outline.as_ref().unwrap().bounds();
+        let large = [Demonstration { image, annotation }];
+        let mut options = TeachOptions::new(1);
+        let sizes = CheckConfig::KNOWN_SAMPLE_SIZES;
+        let scale = |options: &TeachOptions| {
+            let augmenter = augmenter(&large, &sizes, options).unwrap();
+            (augmenter.output_size()[0], augmenter.held_out(0).objects[0].image_from_demonstration.scale)
+        };
+        let (width, reduced) = scale(&options);
+        assert!(width == 8192 && reduced < 0.8, "{width} {reduced}");
+        options.lengths = Some(Lengths::of_level_photos(1000.0, 0.01, 0.005));
+        let (width, kept) = scale(&options);
+        assert!(width == 1024 && (0.85..1.15).contains(&kept), "{width} {kept}");
     }
 
     #[test]
