@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, LabelledInstance, WrittenAnnotation};
 
 use crate::marks_check::MarkedPhoto;
 
@@ -48,9 +48,9 @@ impl AnnotationFile {
     ///
     /// # Errors
     /// The errors of [`Annotation::read_with`].
-    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
-        Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
+        LabelledInstance::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
             Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),
             None => self.path.display().to_string(),
         })
@@ -60,11 +60,15 @@ impl AnnotationFile {
     ///
     /// # Errors
     /// The errors of [`Self::objects`], [`MarkedPhoto::checked`] and [`Annotation::check`].
-    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
+    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<LabelledInstance>> {
         let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
         let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
-        let objects = marked.checked(|facts| self.objects(facts))?;
-        objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
+        let objects =
+            marked.checked(|facts| self.objects(facts), |instance: &LabelledInstance| &instance.annotation)?;
+        objects
+            .iter()
+            .try_for_each(|instance| instance.annotation.check())
+            .with_context(|| self.path.display().to_string())?;
         // After all fallible steps, so that an error is printed alone.
         let (width, height) = image.dimensions();
         self.report_skipped(&ImageFacts { width, height, file_name: path.to_str() });
@@ -176,11 +180,11 @@ pub fn write_marks(
     output: &Path,
     written: &WrittenAnnotation,
     image: &ImageFacts,
-    objects: &[Annotation],
+    instances: &[LabelledInstance],
 ) -> Result<Option<PathBuf>> {
     let existing = written.data_yaml.as_ref().and_then(|_| beside(output, AnnotationFormat::YoloPose));
     if let Some(path) = &existing {
-        check_labels(path, written, image, objects)?;
+        check_labels(path, written, image, instances)?;
     }
     sdg_files::write(output, written.text.as_bytes())?;
     match &written.data_yaml {
@@ -194,11 +198,16 @@ pub fn write_marks(
 }
 
 /// Checks that an existing file gives these objects their labels.
-fn check_labels(path: &Path, written: &WrittenAnnotation, image: &ImageFacts, objects: &[Annotation]) -> Result<()> {
+fn check_labels(
+    path: &Path,
+    written: &WrittenAnnotation,
+    image: &ImageFacts,
+    instances: &[LabelledInstance],
+) -> Result<()> {
     let there = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
     let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
         .with_context(|| path.display().to_string())?;
-    for (found, expected) in read.iter().zip(objects) {
+    for (found, expected) in read.iter().zip(instances.iter().map(|instance| &instance.annotation)) {
         if found.label != expected.label {
             bail!(
                 "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
