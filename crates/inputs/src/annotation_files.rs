@@ -5,17 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, LabelledInstance, WrittenAnnotation};
+use sdg_files::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};
 
 use crate::marks_check::MarkedPhoto;
 
 /// Maximum size of an annotation file with an embedded image.
 pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
-/// Name of the file with the labels of a YOLO dataset.
-pub const DATA_YAML: &str = "data.yaml";
-/// Other common names, which are tried after [`DATA_YAML`] in each folder.
-const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
-/// Number of folders in which data.yaml is searched, from the label file's folder upwards, as in labels/train/a.txt.
-const MAX_PARENT_FOLDERS: usize = 3;
 
 /// An annotation file and the files that belong to it.
 pub struct AnnotationFile {
@@ -88,27 +83,12 @@ impl AnnotationFile {
     }
 }
 
-/// Finds the marks beside a photo: `photo.coco.json`, `photo.json` (COCO or LabelMe) or `photo.txt` (YOLO-pose); for a
-/// YOLO dataset with pictures below `images`, a text file of the photo's name below `labels`. `sdg annotate` writes
-/// `photo.coco.json` only if another tool's `photo.json` must be kept.
+/// Finds the marks of a photo among [`marks_of_photo`].
 ///
 /// # Errors
 /// No such file exists. The message lists the searched names and how to create one.
 pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
-    let in_labels = |photo: &Path| {
-        let folder = photo.parent()?;
-        let mut parts: Vec<_> = folder.components().map(|part| part.as_os_str()).collect();
-        let images = parts.iter().rposition(|part| *part == "images")?;
-        parts[images] = "labels".as_ref();
-        let folder: PathBuf = parts.into_iter().collect();
-        Some(folder.join(photo.with_extension("txt").file_name()?))
-    };
-    let looked_for: Vec<PathBuf> = ["coco.json", "json", "txt"]
-        .map(|extension| photo.with_extension(extension))
-        .into_iter()
-        // The current folder may be `images` or below it.
-        .chain(in_labels(photo).or_else(|| in_labels(&from_root(photo))))
-        .collect();
+    let looked_for = marks_of_photo(photo);
     match looked_for.iter().find(|path| path.is_file()) {
         Some(found) => Ok(found.clone()),
         None => {
@@ -123,26 +103,6 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The path from the root. `.` and `..` at its beginning are replaced; the names after them, also those of links, are
-/// kept.
-fn from_root(path: &Path) -> PathBuf {
-    let start = path.ancestors().find(|start| start.file_name().is_none()).unwrap_or(path);
-    let folder = if start.as_os_str().is_empty() { Path::new(".") } else { start };
-    match (folder.canonicalize(), path.strip_prefix(start)) {
-        (Ok(folder), Ok(rest)) => folder.join(rest),
-        _ => path.to_owned(),
-    }
-}
-
-/// The folder of a file and the folders above it. The names in the path are kept; folders above them have their path
-/// from the root.
-fn folders_above(path: &Path) -> Vec<PathBuf> {
-    let named = path.ancestors().skip(1).take_while(|folder| folder.file_name().is_some()).count() + 1;
-    let above = from_root(path);
-    let above = above.ancestors().skip(1 + named);
-    path.ancestors().skip(1).take(named).chain(above).map(Path::to_owned).collect()
-}
-
 /// The second file that [`AnnotationFile::read`] reads for this annotation file; `None` if there is none, or if the
 /// annotation file cannot be read.
 pub fn file_beside(annotation: &Path) -> Option<PathBuf> {
@@ -153,20 +113,8 @@ pub fn file_beside(annotation: &Path) -> Option<PathBuf> {
 /// The file that belongs to `path`, if it exists.
 fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     match format {
-        AnnotationFormat::OpenDr => {
-            let name = path.file_name()?.to_str()?;
-            let other = match (name.strip_prefix("boxes"), name.strip_prefix("kps")) {
-                (Some(rest), _) => format!("kps{rest}"),
-                (_, Some(rest)) => format!("boxes{rest}"),
-                _ => return None,
-            };
-            Some(path.with_file_name(other)).filter(|other| other.exists())
-        }
-        AnnotationFormat::YoloPose => {
-            let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
-            let folders = folders_above(path).into_iter().take(MAX_PARENT_FOLDERS);
-            folders.flat_map(|folder| names().map(move |name| folder.join(name))).find(|file| file.exists())
-        }
+        AnnotationFormat::OpenDr => other_npy_of(path),
+        AnnotationFormat::YoloPose => data_yaml_of(path),
         _ => None,
     }
 }
