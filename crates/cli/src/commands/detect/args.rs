@@ -49,10 +49,12 @@ pub struct DetectArgs {
     /// half of its area are in the region
     #[arg(long, value_name = "X,Y,W,H|all", allow_hyphen_values = true, value_parser = region_or_all)]
     pub region: Option<RegionArg>,
-    /// Minimum score of accepted detections; a higher value gives fewer wrong and more missed parts
+    /// Minimum score of accepted detections; a higher value gives fewer wrong and more missed parts. Not for tracked
+    /// parts: with --from, it needs --every-frame
     #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]
     pub min_score: f64,
-    /// Also list refused detections, with the reasons
+    /// Also list refused detections, with the reasons; with --from, lost parts, or refused detections with
+    /// --every-frame
     #[arg(long)]
     pub all: bool,
     /// Print one JSON line per image
