@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sdg_evaluation::{Settings, Store};
 
-use crate::support::{Folder, sdg, shipped, taught_pendulum};
+use crate::support::{Folder, sdg, shipped, taught_pendulum, write_unusable_demonstration};
 
 /// Asserts the exit code, and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
@@ -283,16 +283,8 @@ fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
 #[test]
 fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let folder = Folder::new();
-    // A patch of a checkerboard, which occurs everywhere in the picture.
     let photo = folder.path("checks.png");
-    let checks =
-        image::GrayImage::from_fn(640, 480, |x, y| image::Luma([if (x / 40 + y / 40) % 2 == 0 { 200 } else { 60 }]));
-    checks.save(&photo).unwrap();
-    let marks = serde_json::json!({
-        "images": [{"id": 1, "file_name": "checks.png"}],
-        "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "bbox": [240, 160, 160, 160], "keypoints": [300, 240, 2, 340, 240, 2]}],
-        "categories": [{"id": 1, "name": "patch", "keypoints": ["grasp_start", "grasp_end"]}]});
-    folder.text("checks.json", &marks.to_string());
+    write_unusable_demonstration(Path::new(&photo));
     let model = folder.path("model.sdg");
     let taught = sdg(&["teach", "--model", "S", "--demo", &photo, "--out", &model, "--json"]);
     let said = String::from_utf8(taught.stderr).unwrap();
