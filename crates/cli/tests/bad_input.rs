@@ -150,6 +150,11 @@ fn the_annotation_page_does_not_open_on_what_cannot_be_marked() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     assert_refused(&["annotate", "--no-browser", "--port", &port, photo], 1, &["127.0.0.1", &port]);
+    let (new, camera) = (folder.path().join("new.png"), shipped("../workcell", "camera.yaml"));
+    let from = ["annotate", new.to_str().unwrap(), "--from", "sim:pendulum", "--size", "320x240"];
+    let calibrated = ["--camera", camera.to_str().unwrap(), "--mark-height-mm", "16"];
+    let size = "--size: expected 640x480, the size of the calibration, found 320x240";
+    assert_refused(&[&from[..], &calibrated].concat(), 2, &[size]);
     fs::write(folder.path().join("photo.json"), "{\"shapes\": [}").unwrap();
     assert_refused(&["annotate", photo], 1, &["photo.json", "not JSON"]);
 }

@@ -198,7 +198,14 @@ fn cameras_that_are_none_are_refused() {
     assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);
     assert_refused(&grab(&file, &["--stall-secs=-1"]), 2, &["positive number of seconds"]);
     assert_refused(&grab(&file, &["--stall-secs", "1e30"]), 2, &["--stall-secs", "0.01 to 3600 seconds"]);
-    assert_refused(&grab(&file, &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
+    assert_refused(&grab("http://127.0.0.1:1/", &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
+    // Settings that the camera does not have.
+    let of_v4l = ["--size", "640x480", "--encoding", "yuyv", "--exposure-ms", "8", "--white-balance-kelvin", "4600"];
+    let told = "--size, --encoding, --exposure-ms, --white-balance-kelvin: expected a V4L2 camera (v4l:)";
+    for address in [file.as_str(), "cmd:true", "http://127.0.0.1:1/", "sim:pendulum"] {
+        assert_refused(&grab(address, &of_v4l), 2, &[told, &format!("found {address}")]);
+    }
+    assert_refused(&grab(&file, &["--fps", "10"]), 2, &["--fps: expected", "found file:"]);
     assert_refused(&grab(&file, &["--every=-1"]), 2, &["0 to 86400"]);
     assert!(!out.exists(), "a failed call writes nothing");
     let jpeg = sdg(&["camera", "grab", "--from", &file, "--out", "frame.jpg"]);

@@ -142,6 +142,10 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&workcell, &["--robot", "sim", "--from", "dir:/tmp"], 2, &["expected sim:PART"]);
     grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulum?speed=5"], 2, &["\"speed=5\""]);
     grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulums"], 2, &["--from: ", "pendulums"]);
+    let size = "--size: expected 640x480, the size of the calibration, found 320x240";
+    grasp(&workcell, &[&sim[..], &["--size", "320x240"]].concat(), 2, &[size]);
+    let exposure = ["--exposure-ms: expected a V4L2 camera", "found sim:pendulum"];
+    grasp(&workcell, &[&sim[..], &["--exposure-ms", "8"]].concat(), 2, &exposure);
     for speed in ["0", "0.7", "-1", "NaN"] {
         let speed = format!("--speed={speed}");
         grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a fraction", "at most 0.6"]);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use sdg_camera::{Address, LatestFrame, PixelFrame};
+use sdg_camera::{Address, LatestFrame, OpenOptions, PixelFrame};
 use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, ModelFinder, Pictures};
 use sdg_grasp::GraspError;
 use sdg_inputs::camera_files;
@@ -85,6 +85,9 @@ pub struct GraspArgs {
 pub fn run(args: &GraspArgs) -> Result<Outcome> {
     let task = prepare(args)?;
     let choice = RobotChoice::named(args.robot.as_ref(), task.workcell.address.as_deref())?;
+    let [width, height] = task.camera.size_px();
+    args.request.check_size([width, height], "of the calibration")?;
+    let options = OpenOptions { width, height, frame: PixelFrame::Sensor, ..args.request.options(&args.from)? };
     let interrupt = Interrupt::watch();
     // An output path that is not a folder is reported before anything moves; the folder is created when there is
     // something to write.
@@ -94,9 +97,6 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
     match choice {
         RobotChoice::Sim => simulated(args, &task, &interrupt),
         RobotChoice::Network(address) => {
-            let mut options = args.request.options();
-            [options.width, options.height] = task.camera.size_px();
-            options.frame = PixelFrame::Sensor;
             let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
             arm.check_model(task.workcell.robot)?;

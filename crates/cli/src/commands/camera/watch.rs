@@ -37,7 +37,7 @@ pub fn run(args: &WatchArgs) -> Result<Outcome> {
         limit => limit.map(Duration::from_secs_f64),
     };
     let interrupt = Interrupt::watch();
-    let mut camera = open(&args.live.from, &args.live.options())?;
+    let mut camera = open(&args.live.from, &args.live.options()?)?;
     let start = Instant::now();
     let mut period = FrameStatistics::begin();
     let mut num_frames = 0_u64;

@@ -112,18 +112,15 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
 
 /// Opens the camera with the size of its calibration, or of the model's region.
 fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<Frames> {
-    let mut options = args.request.options();
-    options.frame = detector.pixel_frame();
     let of_region = detector.region().and_then(|region| region.picture);
-    if let Some([width, height]) = detector.picture_size().or(of_region) {
-        if let Some(asked) = args.request.size.filter(|&asked| asked != (width, height)) {
-            let whose = if detector.picture_size().is_some() { "of the calibration" } else { "of the region" };
-            return Err(Usage(format!(
-                "--size: expected {width}x{height}, the size {whose}, found {}x{}",
-                asked.0, asked.1
-            ))
-            .into());
-        }
+    let size = detector.picture_size().or(of_region);
+    if let Some(size) = size {
+        let whose = if detector.picture_size().is_some() { "of the calibration" } else { "of the region" };
+        args.request.check_size(size, whose)?;
+    }
+    let mut options = args.request.options(address)?;
+    options.frame = detector.pixel_frame();
+    if let Some([width, height]) = size {
         (options.width, options.height) = (width, height);
     }
     Ok(Frames::of(live_pictures::open(address, &options)?, address))
