@@ -53,12 +53,12 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
 
     let out = folder.path().join("drawn");
     let dry = sdg(&[&base[..], &from, &["--dry-run", "--out", text(&out)]].concat());
-    let stderr = String::from_utf8(dry.stderr).unwrap();
+    let [plan, stderr] = [dry.stdout, dry.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
     assert!(dry.status.success(), "{stderr}");
     // The grasp is 9 mm above the table, 7 mm below the marks; the run itself measures this height.
-    assert!(stderr.contains(", 9) mm in ") && stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
+    assert!(plan.contains(", 9) mm in ") && plan.contains("hand close on about 16 mm with 40 N"), "{plan}");
     let soft = sdg(&[&base[..], &from, &["--dry-run", "--soft", "--out", text(&out)]].concat());
-    let told = String::from_utf8(soft.stderr).unwrap();
+    let told = String::from_utf8(soft.stdout).unwrap();
     assert!(soft.status.success() && told.contains("down softly to about 9 mm, or until contact"), "{told}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
