@@ -61,8 +61,8 @@ pub struct DetectArgs {
     #[arg(long)]
     pub json: bool,
     /// Write each image with its grasps to this folder; refused detections show marks where edges, surface and features
-    /// differ from the photo. With --from, serve the pictures to browsers at this port of 127.0.0.1 instead (0: any
-    /// free port)
+    /// differ from the photo, except with --camera and under a slanted camera. With --from, serve the pictures to
+    /// browsers at this port of 127.0.0.1 instead (0: any free port)
     #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
     /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of images, or - for one image from standard input
