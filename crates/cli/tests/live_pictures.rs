@@ -164,6 +164,17 @@ fn watch_tells_rate_brightness_and_faults() {
     assert!(fps > 5.0 && fps < 52.0, "{fps}");
     assert!(told[0]["faults"].as_array().unwrap().is_empty(), "files may repeat: {}", told[0]);
 
+    // Without a frame there is no size.
+    let empty = tempfile::tempdir().unwrap();
+    let address = format!("dir:{}?follow", empty.path().display());
+    let silent = ["camera", "watch", "--from", &address, "--stall-secs", "0.1", "--seconds", "0.5", "--json"];
+    let output = sdg(&silent);
+    let told = lines(&output);
+    assert_eq!((output.status.code(), &told[0]["frames"]), (Some(3), &0.into()));
+    for field in ["width", "height", "brightness"] {
+        assert_eq!(told[0][field], Value::Null, "{}", told[0]);
+    }
+
     // A live camera that repeats the same picture, and black pictures.
     let watch = |line: &str| {
         let address = format!("cmd:yes '{line}'");
