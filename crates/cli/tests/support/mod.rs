@@ -4,6 +4,8 @@
 
 mod documented;
 
+pub use documented::assert_fields_are_documented;
+
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,7 +19,7 @@ use sdg_demonstration::{Annotation, ImageFacts};
 /// Runs `sdg` and waits until it exits. Fields of the printed JSON that no document describes fail the test.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap();
-    documented::assert_fields_are_documented(arguments, &output.stdout);
+    assert_fields_are_documented(arguments, &output.stdout);
     output
 }
 
