@@ -5,6 +5,8 @@ use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
 
+use crate::support::assert_fields_are_documented;
+
 static NUM_STARTED: AtomicU16 = AtomicU16::new(0);
 
 /// A simulated Panda on the network, started as another program; killed when dropped.
@@ -35,6 +37,7 @@ impl Simulated {
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.contains(&port), "{line}");
+        assert_fields_are_documented(&["simulate", "--json"], line.as_bytes());
         Self { child, address: format!("127.0.0.1:{port}") }
     }
 
