@@ -35,7 +35,7 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
-    /// The load of the hand that was set last.
+    /// The load of the hand with which motions are planned.
     load: Load,
     /// The last compliant descent, of this program or an earlier one, until the next motion has ended without an error.
     felt_below: Option<FeltBelow>,
@@ -128,13 +128,12 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// The straight motion up by `up_m` of an arm that is lower than the limits allow, after a program ended during a
-    /// compliant descent; `None` for an arm within the limits. [`Self::follow`] then allows this motion.
-    ///
-    /// # Errors
-    /// [`RobotError::Unsafe`] if the arm is more than 10 mm lower than the limits allow; [`RobotError::Planning`], and
-    /// the errors of [`Self::commanded`].
-    pub fn plan_ascent(&mut self, up_m: f64, cartesian: &CartesianLimits) -> Result<Option<Trajectory>> {
+    /// As [`Self::plan_ascent`], without a comparison with obstacles.
+    pub(crate) fn plan_ascent_within_limits(
+        &mut self,
+        up_m: f64,
+        cartesian: &CartesianLimits,
+    ) -> Result<Option<Trajectory>> {
         let start = self.commanded()?;
         let base_from_tcp = self.geometry().forward(&start);
         let tcp = base_from_tcp.translation.vector;
@@ -263,6 +262,11 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.note(set)?;
         self.load = load;
         Ok(())
+    }
+
+    /// Plans further motions with this load of the hand, which the arm does not get yet: see [`Self::set_load`].
+    pub fn plan_with_load(&mut self, load: Load) {
+        self.load = load;
     }
 
     /// Recovers the arm and allows motions again, after a person has checked it.

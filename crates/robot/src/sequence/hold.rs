@@ -13,14 +13,12 @@ use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDT
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
-use crate::surroundings::Surroundings;
+use crate::surroundings::{LINE_MARGIN_M, Surroundings};
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
 /// Steps by which a straight motion up is shortened if the arm cannot follow the whole motion, m.
 const UP_STEP_M: f64 = 0.05;
-/// Minimum distance from the obstacles of the cell on straight motions, m.
-const LINE_MARGIN_M: f64 = 0.003;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Closes the hand on the part.
