@@ -26,6 +26,7 @@ struct Cell {
     delay: Duration,
     /// Distance of the contact below the expected one, m.
     lower_m: f64,
+    num_stops: usize,
 }
 
 impl Cell {
@@ -77,6 +78,7 @@ impl Arm for Cell {
         Ok(())
     }
     fn stop(&mut self) -> Result<()> {
+        self.num_stops += 1;
         Ok(())
     }
     fn recover(&mut self) -> Result<()> {
@@ -116,6 +118,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         mode: ArmMode::Idle,
         delay: Duration::ZERO,
         lower_m: 0.0,
+        num_stops: 0,
     }
 }
 
@@ -194,6 +197,23 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose()); 2], ..config() };
     let ended = grasp(&mut robot, &mut Stopped, &mut (), CameraPose::InBase(Isometry3::identity()), &config);
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
+}
+
+#[test]
+fn a_stop_between_the_hand_and_the_arm_stops_the_fingers() {
+    let mut cell = cell(Isometry3::identity());
+    let mut num_asked = 0;
+    let watch = Watch::new(Box::new(move || {
+        num_asked += 1;
+        (num_asked > 1).then_some(StopReason::Interrupted)
+    }));
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), watch);
+    let motion = robot.plan_free(&ready_pose(), &sdg_kinematics::JointLimits::panda()).unwrap();
+    robot.start_hand(HandCommand::Move { opening_m: 0.04, speed_m_s: RELEASING_SPEED_M_S }).unwrap();
+    let ended = robot.follow(motion.clone());
+    assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Interrupted))), "{ended:?}");
+    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
+    assert_eq!(cell.num_stops, 1);
 }
 
 /// Finds the part; planning with each picture takes at least this much longer than [`MAX_AGE`].
