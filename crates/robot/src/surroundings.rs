@@ -23,6 +23,9 @@ const MAX_CHECKS: usize = 50_000;
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
+/// Distance that obstacles nearer than this at the start of a straight motion up may keep, m: it becomes at most
+/// [`START_ROOM_M`] smaller.
+pub(crate) const NEAR_AT_START_M: f64 = LINE_MARGIN_M + START_ROOM_M;
 /// The obstacle under a surface contains the point this far below the surface, m.
 const BELOW_SUPPORT_M: f64 = 0.001;
 /// The obstacle under a surface does not contain the point this far above the surface, m: a solid around the surface is
@@ -70,7 +73,8 @@ pub struct Surroundings<'a> {
     pub held: &'a [Capsule],
     /// Whether obstacles may be nearer to `held` at the start of a free motion than the planner allows, because only the
     /// largest extent of the part is known. Such an obstacle does not touch the part, and must not prevent the motion
-    /// away from it; the part gets at most 5 mm nearer to it than at the start.
+    /// away from it; the part gets at most 5 mm nearer to it than at the start. On straight paths this applies to the
+    /// hand, which may be lower than planned after a contact; it gets at most 2 mm nearer.
     pub may_start_near: bool,
     /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
@@ -252,7 +256,7 @@ impl<A: Arm> Robot<'_, A> {
         let (arm, start) = (self.geometry(), motion.start());
         let mut model = surroundings.model(arm, self.limits().table_height_m)?;
         for body in (1..=NUM_JOINTS).map(Body::link).chain([Body::HAND, Body::HELD_PART]) {
-            model.allow_overlaps_at(body, start, LINE_MARGIN_M + START_ROOM_M);
+            model.allow_overlaps_at(body, start, NEAR_AT_START_M);
         }
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
         let CheckedLine { share, path, blocked_by } =

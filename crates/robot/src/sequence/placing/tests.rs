@@ -513,6 +513,23 @@ fn the_hand_leaves_a_tray_that_is_lower_than_its_file_says() {
 }
 
 #[test]
+fn the_hand_leaves_a_place_where_it_came_nearer_to_an_obstacle_than_planned() {
+    // The hand's body is 29 mm above the tcp. At the expected contact it is 5 mm above the post; the real contact is
+    // 5 mm lower.
+    let goal = Place { kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
+    let at = goal.base_from_part(0.0, 0.0) * Point3::new(0.0, 0.085, 0.0);
+    let half_m = [0.008, 0.008, 0.5 * (0.03 + 0.0294 - 0.005)];
+    let base_from_obstacle = Isometry3::translation(at.x, at.y, half_m[2]);
+    let post = Obstacle { name: "post".to_owned(), shape: Shape::Box { half_m }, base_from_obstacle };
+    let mut cell = cell(Isometry3::identity());
+    (cell.base_from_part.translation.z, cell.lower_m) = (0.03, 0.005);
+    let known = GraspConfig { part: Some(bar()), obstacles: vec![post], ..config() };
+    let report = run(&mut cell, &known, &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
 fn in_a_tray_of_one_row_only_the_pitch_along_it_counts() {
     let kind = PlaceKind::Tray { cells: [5, 1], pitch_m: [0.1, 0.01] };
     let goal = Place { kind, ..tray() }.goal(1).unwrap();
