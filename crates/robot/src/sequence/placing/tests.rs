@@ -3,7 +3,7 @@ use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandState, MotionE
 use crate::error::RobotError;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
-use crate::place::{Place, PlaceKind};
+use crate::place::PlaceKind;
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::safety::{CheckedMotion, SafetyLimits, WorkspaceBox};
 use crate::sequence::{LookOut, grasp};
@@ -483,6 +483,30 @@ fn an_older_part_in_the_bin_is_not_the_one_put_down() {
     let report = place(0.08);
     let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the part lies beside the bin"), "{why}");
+}
+
+#[test]
+fn a_part_that_was_never_in_the_bin_is_not_the_one_that_fell_beside_it() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    // 7 mm beside the bin; no earlier picture showed it.
+    let other = bin.base_from_part(0.02, 0.0) * Isometry3::translation(0.057, 0.0, 0.0);
+    let place = |slide: Isometry3<f64>, places: Vec<Place>| {
+        let mut cell = cell(slide);
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let mut finder = WithOlder { older: other, others: Vec::new() };
+        let (camera, placing) = (CameraPose::InBase(Isometry3::identity()), PlacingConfig::default());
+        let known = GraspConfig { part: Some(bar()), places, ..config() };
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &known, &bin, &placing).unwrap()
+    };
+    // The part lies in a corner of the bin, 64 mm from the centre.
+    let report = place(planar(0.045, 0.045, 0.0), Vec::new());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    // The part fell beside the bin, and the other one lies in a place of its own.
+    let at_m = other.translation.vector.xy().into();
+    let shelf = Place { name: "shelf".to_owned(), at_m, kind: PlaceKind::Pose, ..tray() };
+    let report = place(planar(0.08, 0.0, 0.0), vec![shelf]);
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.starts_with("the part lies beside the bin, 80.0 mm"), "{why}");
 }
 
 #[test]
