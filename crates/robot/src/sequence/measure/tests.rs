@@ -37,7 +37,7 @@ impl PartFinder<PlannedArm> for Shown {
         let is_shown = self.shows.get(self.num_sights).or(self.shows.last()).copied().unwrap_or(true);
         self.num_sights += 1;
         let mut shown = if is_shown { self.known.sight(arm, expected)? } else { Vec::new() };
-        if self.num_sights % 2 == 0 {
+        if self.num_sights.is_multiple_of(2) {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.turned_rad);
             shown.iter_mut().for_each(|shown| {
                 let pose = &mut shown.target.base_from_tcp;
