@@ -78,8 +78,8 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
     ];
     let out = folder.path("drawn");
     let dry = sdg(&[&call[..], &["--dry-run", "--out", &out]].concat());
-    let told = String::from_utf8(dry.stderr).unwrap();
-    assert!(dry.status.success() && told.contains("down softly to about "), "{told}");
+    let [plan, told] = [dry.stdout, dry.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert!(dry.status.success() && plan.contains("down softly to about "), "{plan} {told}");
     assert!(told.ends_with("nothing was moved\n"), "{told}");
 
     let done = sdg(&[&call[..], &["--json", "--out", &out]].concat());
@@ -173,7 +173,7 @@ fn a_workcell_is_drawn_from_above() {
     let cell = workcell(&folder, "cell.toml", PLACES);
     let out = folder.path("cell.png");
     let done = sdg(&["workcell", "show", &cell, "--grid-mm", "50", "--out", &out]);
-    let told = String::from_utf8(done.stderr).unwrap();
+    let told = String::from_utf8(done.stdout).unwrap();
     assert!(done.status.success(), "{told}");
     for part in ["\"shelf\" is reached", "\"tray\": all 4 cells are reached", "m² at every tested angle of the hand"] {
         assert!(told.contains(part), "expected \"{part}\" in: {told}");

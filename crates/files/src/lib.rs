@@ -4,6 +4,7 @@
 //! path ─ read (size limit, registered as an input) ─ bytes
 //! bytes ─ write: no input, no file of another kind is replaced ─ write_atomically: temporary file, sync, rename ─ path
 //! path ─ Lock: exclusive or shared, until it is dropped; WriterLock: names the process that writes a file
+//! photo ─ marks_of_photo: the possible files of its marks
 //! ```
 //!
 //! Errors name the path and the system's reason. Deliberately absent: the meaning of the bytes, options, and texts for
@@ -33,6 +34,7 @@ mod folder;
 mod inputs;
 mod kind;
 mod lock;
+mod marks;
 
 pub use atomic::{AtomicFile, write_atomically};
 pub use bounded::{read, read_bounded};
@@ -44,3 +46,4 @@ pub use inputs::{
     is_same_file, keep, write,
 };
 pub use lock::{Access, Lock, WriterLock};
+pub use marks::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};

@@ -49,9 +49,9 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
     let map = WorkcellMap::around(&workcell);
     let reach = Reach::of(&workcell, map.area_m(), args.grid_mm * 1e-3, args.height_mm * 1e-3)?;
     for line in reach.lines(&workcell) {
-        eprintln!("{line}");
+        println!("{line}");
     }
     sdg_files::write_drawing(&args.out, &map.draw(&workcell, &reach))?;
-    eprintln!("{}", args.out.display());
+    println!("{}", args.out.display());
     Ok(Outcome::Done)
 }

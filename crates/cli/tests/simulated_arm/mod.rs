@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 #[cfg(unix)]
 const MAX_ENDING: Duration = Duration::from_secs(60);
 
+use crate::support::assert_fields_are_documented;
+
 static NUM_STARTED: AtomicU16 = AtomicU16::new(0);
 
 /// A simulated Panda on the network, started as another program; killed when dropped.
@@ -41,6 +43,7 @@ impl Simulated {
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.contains(&port), "{line}");
+        assert_fields_are_documented(&["simulate", "--json"], line.as_bytes());
         Self { child, address: format!("127.0.0.1:{port}") }
     }
 

@@ -60,7 +60,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         sdg_files::keep(path);
     }
     let interrupt = Interrupt::watch();
-    let mut camera = open(&args.live.from, &options(&args.live, calibrated.as_ref()))?;
+    let mut camera = open(&args.live.from, &options(&args.live, calibrated.as_ref())?)?;
     // A live camera delivers frames during the wait: the newest frame is taken, and older ones are dropped.
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
@@ -96,15 +96,15 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
 }
 
 /// The settings of the camera; those of a calibrated camera give its size and the pixels that were calibrated.
-fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> OpenOptions {
-    let mut options = live.options();
+fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> Result<OpenOptions, Usage> {
+    let mut options = live.options()?;
     if let Some(calibrated) = calibrated {
         options.frame = PixelFrame::Sensor;
         if live.request.size.is_none() {
             (options.width, options.height) = (calibrated.intrinsics.width, calibrated.intrinsics.height);
         }
     }
-    options
+    Ok(options)
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

@@ -69,14 +69,14 @@ impl TakingArgs {
         board: &Board,
         config: impl Fn((u32, u32)) -> CalibrationConfig,
     ) -> Result<Vec<BoardPicture>> {
+        let mut options = self.request.options(address)?;
+        options.frame = PixelFrame::Sensor;
         let folder = self.taken.as_deref().unwrap_or(Path::new(DEFAULT_FOLDER));
         sdg_files::prepare_folder(folder)?;
         if std::fs::read_dir(folder).with_context(|| named(folder))?.next().is_some() {
             let found = folder.display();
             return Err(Usage(format!("--taken: expected a new or an empty folder, found files in {found}")).into());
         }
-        let mut options = self.request.options();
-        options.frame = PixelFrame::Sensor;
         let mut camera = live_pictures::open(address, &options)?;
         let is_live = address.is_live();
         if is_live {

@@ -16,7 +16,7 @@ use sdg_robot::DEFAULT_SPEED;
 use sdg_robot::workcell::Workcell;
 
 use crate::exit::{Outcome, Usage};
-use crate::json_line::json_line;
+use crate::json_line::{json_line, tell};
 use crate::robots;
 use arguments::{GoalPose, Held, JointsDeg};
 
@@ -97,9 +97,9 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let motions = plan.trajectories(&joints, &tcp, &dynamics)?;
     let stopping_secs = plan.stopping_secs(&joints, &tcp, &dynamics)?;
     let explained = ExplainedPlan::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
-    eprint!("{}", explained.text());
+    tell(args.json, explained.text().trim_end());
     if let Some(refused) = refused_by_limits(&workcell, &motions) {
-        eprintln!("  sdg grasp would reject it: {refused}");
+        tell(args.json, &format!("  sdg grasp would reject it: {refused}"));
     }
     if args.json {
         println!("{}", json_line(&explained.json())?);
@@ -118,7 +118,7 @@ fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<
         return Ok(());
     }
     for file in sdg_evaluation::draw_motions(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
-        eprintln!("  {}", file.display());
+        tell(args.json, &format!("  {}", file.display()));
     }
     Ok(())
 }

@@ -58,7 +58,7 @@ pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
     let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S }, &args.states)?;
     // The hand no longer holds an object.
     arm.set_load(Load::NONE)?;
-    eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
+    println!("the hand is {:.1} mm open", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 
@@ -75,7 +75,7 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     };
     let hand = command(&mut arm, close, &args.states)?;
     let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
-    eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
+    println!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 

@@ -75,7 +75,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let is_holding = robot.hand()?.is_grasping;
     let motions = plan(&mut robot, &workcell, &pace, is_holding)?;
     if motions.iter().all(|motion| motion.duration_secs() <= 0.0) {
-        eprintln!("the arm at {address} is at home");
+        println!("the arm at {address} is at home");
         return Ok(Outcome::Done);
     }
     let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
