@@ -4,6 +4,12 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
+#[cfg(unix)]
+use std::time::{Duration, Instant};
+
+/// Maximum duration of the end of the program after a signal, far beyond that on a busy machine.
+#[cfg(unix)]
+const MAX_ENDING: Duration = Duration::from_secs(60);
 
 use crate::support::assert_fields_are_documented;
 
@@ -47,11 +53,18 @@ impl Simulated {
         assert!(sent.success());
     }
 
-    /// The exit code after a signal.
+    /// The exit code after a signal, which ends the program within [`MAX_ENDING`].
     #[cfg(unix)]
     pub fn interrupted(mut self, signal: &str) -> Option<i32> {
         self.signal(signal);
-        self.child.wait().unwrap().code()
+        let deadline = Instant::now() + MAX_ENDING;
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status.code();
+            }
+            assert!(Instant::now() < deadline, "{signal} did not end the program within {MAX_ENDING:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 }
 

@@ -166,6 +166,7 @@ impl Workcell {
             load,
             obstacles: self.obstacles.clone(),
             part_radius_m: self.part_radius_m,
+            places: self.places.clone(),
             ..GraspConfig::default()
         }
     }
