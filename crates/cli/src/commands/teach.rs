@@ -1,7 +1,6 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
 use std::fmt::Display;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -372,9 +371,8 @@ fn read_given_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Op
     let mut told = None;
     let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
         if !args.json {
-            let mut stdout = std::io::stdout().lock();
-            write!(stdout, "{}", report.exceptions())?;
-            writeln!(stdout, "base weights {} (names of {}): {}", path.display(), report.naming, report.summary())?;
+            print!("{}", report.exceptions());
+            println!("base weights {} (names of {}): {}", path.display(), report.naming, report.summary());
         }
         told = Some(report.clone());
         Ok(())
