@@ -12,7 +12,7 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_evaluation::{TaughtFile, quoted, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
+use sdg_grasp::{AcceptedNegative, CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights, first_names};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -52,7 +52,7 @@ pub struct TeachArgs {
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
     /// calibrated so that nothing is accepted in it, as long as nine in ten parts in held-out samples are still
-    /// accepted; repeat for several
+    /// accepted; else the picture does not change the score, and a warning names it. Repeat for several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write
@@ -218,6 +218,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     for warning in figures.warnings() {
         eprintln!("{} {warning}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
+    for AcceptedNegative { idx, score } in &taught.accepted_negatives {
+        let (warning, picture) = (Paint::stderr().text(Tone::Doubtful, "warning:"), args.negatives[*idx].display());
+        eprintln!("{warning} --negative {picture}: still accepted with {score:.2}: does it show the part?");
+    }
     for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
     }
@@ -259,10 +263,11 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             println!("searches {region} of pictures of the photo's size");
         }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
-            println!(
-                "refuses {refused} of {pictures} pictures without the part; for this, every score is lowered by {:.1} log-odds",
-                -log_odds
-            );
+            let lowered = match log_odds < 0.0 {
+                true => format!("; for this, every score is lowered by {:.1} log-odds", -log_odds),
+                false => String::new(),
+            };
+            println!("refuses {refused} of {pictures} pictures without the part{lowered}");
         }
         if let Some(lengths) = &facts.lengths {
             println!(
