@@ -36,6 +36,7 @@ mod found_text;
 mod interrupt;
 mod json_line;
 mod live_pictures;
+mod new_folder;
 mod paint;
 #[cfg(feature = "simulation")]
 mod parts;

@@ -255,6 +255,9 @@ fn augment_writes_pictures_and_their_list() {
     let out = folder.path().join("samples");
     let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let run = |seed: &str| {
+        if out.exists() {
+            fs::remove_dir_all(&out).unwrap();
+        }
         let output = sdg(&[
             "augment",
             "--demo",

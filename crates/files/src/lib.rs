@@ -44,8 +44,7 @@ pub use drawing::{write_drawing, write_png};
 pub use error::{FileError, Result};
 pub use folder::{entries, has_extension, prepare_folder};
 pub use inputs::{
-    check_are_no_inputs, check_extendable, check_readable, check_replaceable, check_writable, create, extend,
-    is_same_file, keep, write,
+    check_extendable, check_readable, check_replaceable, check_writable, create, extend, is_same_file, keep, write,
 };
 pub use lock::{Access, Lock, WriterLock};
 pub use marks::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};
