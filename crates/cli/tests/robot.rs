@@ -215,11 +215,11 @@ fn an_arm_that_is_not_there_is_one_line() {
     }
     assert_refused(&["robot", "state"], 2, &["expected --robot ADDRESS"]);
     assert_refused(&["robot", "open", "--robot", "sim"], 2, &["expected the address of an arm"]);
-    assert_refused(
-        &["robot", "open", "--robot", "h", "--width-mm", "90"],
-        2,
-        &["--width-mm: expected 0 to 80, found 90"],
-    );
+    for (width, expected) in
+        [("90", "an opening of 0 to 80 millimetres, found 90"), ("0.04", "metres given as millimetres?")]
+    {
+        assert_refused(&["robot", "open", "--robot", "h", "--width-mm", width], 2, &["--width-mm", expected]);
+    }
     assert_refused(&["robot", "close", "--robot", "h", "--force-n", "0"], 2, &["--force-n: expected 1 to 70"]);
     assert_refused(&["robot", "home", "--robot", "h"], 2, &["expected --workcell FILE"]);
     assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, named};
 use crate::exit::{Outcome, one_line};
+use crate::shared_args::table_height_mm;
 
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
@@ -98,12 +99,6 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     }
     report(args, mount, &found, &seen, lines)?;
     Ok(Outcome::Done)
-}
-
-/// Parses the table's z, which can be any finite number: the camera's height above it is checked later.
-fn table_height_mm(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| format!("expected the table's z in millimetres, found {text}"))
 }
 
 /// Adds the option that corrects the error.

@@ -18,6 +18,7 @@ use sdg_robot::workcell::Workcell;
 use crate::exit::{Outcome, Usage};
 use crate::json_line::{json_line, tell};
 use crate::robots;
+use crate::shared_args::opening_mm;
 use arguments::{GoalPose, Held, JointsDeg};
 
 /// `sdg plan`
@@ -43,7 +44,7 @@ pub struct PlanArgs {
     #[arg(long, value_name = "SIZE")]
     pub held_mm: Option<Held>,
     /// Distance between the open fingers
-    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = arguments::opening_mm)]
+    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = opening_mm)]
     pub opening_mm: f64,
     /// Minimum distance to all obstacles
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = arguments::margin_mm)]
