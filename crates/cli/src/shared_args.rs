@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
-use sdg_grasp::{ComputeBackend, SearchRegion};
+use sdg_grasp::{ComputeBackend, GraspModel, SearchRegion, Verification};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_robot::height::GivenHeight;
 
@@ -156,6 +156,18 @@ pub fn share(text: &str) -> Result<f64, String> {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
         _ => Err("expected a number from 0 to 1".to_owned()),
     }
+}
+
+/// The verification of a command with `--no-verify`, which has no effect on a model without a network.
+pub fn verification(no_verify: bool, model: &GraspModel) -> Verification {
+    if !no_verify {
+        return Verification::ByShape;
+    }
+    if !model.kind().has_network() {
+        eprintln!("--no-verify: expected a model with a network, found model {}: its parts are checked", model.kind());
+        return Verification::ByShape;
+    }
+    Verification::Off
 }
 
 /// Parses a positive, finite number.

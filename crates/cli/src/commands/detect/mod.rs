@@ -21,7 +21,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::{FoundText, advice_with_options};
 use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
-use crate::shared_args::RegionArg;
+use crate::shared_args::{RegionArg, verification};
 
 /// Prints the detections in each image. For an image that cannot be used, reports the error and continues.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
@@ -63,6 +63,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     let mut batch = Batch {
         args,
         detector: &detector,
+        verification: verification(args.no_verify, detector.model()),
         stdout: std::io::stdout().lock(),
         drawn: BTreeSet::new(),
         num_used: 0,
@@ -105,6 +106,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
+    verification: Verification,
     stdout: W,
     /// File names of the drawings written so far.
     drawn: BTreeSet<String>,
@@ -167,10 +169,9 @@ impl<'a, W: Write> Batch<'a, W> {
     }
 
     fn detect(&mut self, input: &PictureInput) -> Result<SearchedPicture> {
-        let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
         let mut image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
-        let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
+        let detections = self.detector.detect(&image, self.verification).with_context(|| input.name())?;
         let seconds = start.elapsed().as_secs_f64();
         let seen = SearchedPicture { size: image.dimensions().into(), seconds, detections };
         if let Some(folder) = &self.args.draw {
