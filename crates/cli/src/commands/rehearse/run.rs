@@ -153,6 +153,9 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         }
         let done = if rehearsed.is_placing { "placed" } else { "grasped" };
         println!("{done} it in {} of {} attempts", rehearsed.successes(), rehearsed.attempts.len());
+        if let Some(told) = rehearsed.interruption() {
+            println!("{told}");
+        }
         println!("report: {}", report.display());
     }
     Ok(if rehearsed.found_nothing() { Outcome::NothingToGrasp } else { Outcome::Done })
