@@ -385,3 +385,17 @@ fn a_folder_or_a_model_alone_and_options_of_the_protocol_are_wrong_usage() {
         assert_eq!(sdg(arguments).status.code(), Some(2), "{arguments:?}");
     }
 }
+
+#[test]
+fn labels_of_another_part_are_told_and_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, report) = (teach(folder.path()), folder.path().join("report"));
+    let case = Case::new("a.json", &labelme(&instance("bolt", 1, 100.0)));
+    let pictures = case.folder.path();
+    let evaluated =
+        sdg(&["evaluate", "--pictures", text(pictures), "--grasp-model", text(&model), "--report", text(&report)]);
+    let stderr = String::from_utf8(evaluated.stderr).unwrap();
+    assert!(stderr.contains("all labels are `bolt`, the model's part is `pendulum`"), "{stderr}");
+    let told = evaluate(pictures, &model, &report, &["--label", "pendulum"]);
+    assert_eq!((&told["pictures_without_part"], &told["other_labels"]), (&json!(1), &json!(1)));
+}

@@ -28,6 +28,13 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
+    if let Some(label) = &labelled.foreign_label {
+        let object = model.object();
+        eprintln!(
+            "all labels are `{label}`, the model's part is `{object}`: they count as the part; --label {object} counts \
+             the pictures as without it"
+        );
+    }
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     sdg_files::prepare_folder(&report_folder)?;
 
