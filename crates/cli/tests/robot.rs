@@ -333,6 +333,8 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let asked = sdg(&grasp);
     let stderr = String::from_utf8(asked.stderr).unwrap();
     assert!(asked.status.success() && stderr.ends_with("nothing was moved\n"), "{stderr}");
+    let line: Value = serde_json::from_slice(&asked.stdout).unwrap();
+    assert_eq!((&line["moved"], &line["held"]), (&false.into(), &false.into()), "{line}");
 
     let done = sdg(&[&grasp[..], &["--yes"]].concat());
     let stderr = String::from_utf8(done.stderr).unwrap();
