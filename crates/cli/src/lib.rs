@@ -36,7 +36,7 @@ mod found_text;
 mod interrupt;
 mod json_line;
 mod live_pictures;
-mod new_folder;
+mod output_paths;
 mod paint;
 #[cfg(feature = "simulation")]
 mod parts;

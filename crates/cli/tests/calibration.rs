@@ -123,6 +123,8 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     let files = Folder::new();
     let (svg, pdf) = (files.path("board.svg"), files.path("board.pdf"));
     stdout(&["camera", "board", "--out", &svg, "--pdf", &pdf]);
+    assert_refused(&["camera", "board", "--out", &pdf], 2, &["--out: expected a file that ends in .svg"]);
+    assert_refused(&["camera", "board", "--pdf", &svg], 2, &["--pdf: expected a file that ends in .pdf"]);
     assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF-1.7"));
     let sheet = printed(&fs::read_to_string(&svg).unwrap());
 

@@ -188,4 +188,7 @@ fn a_workcell_is_drawn_from_above() {
     assert!(near([192, 178, 203]) > 2_000, "{}", near([192, 178, 203]));
     refused(&["workcell", "show", &cell, "--grid-mm", "1"], 2, &["--grid-mm: expected a number from 5 to 200"]);
     refused(&["workcell", "show", "/nowhere.toml"], 1, &["/nowhere.toml"]);
+    for out in ["cell.pdf", "-"] {
+        refused(&["workcell", "show", &cell, "--out", out], 2, &["--out: expected a file that ends in .png"]);
+    }
 }

@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
-use crate::new_folder::prepare_new_folder;
+use crate::output_paths::prepare_new_folder;
 
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]

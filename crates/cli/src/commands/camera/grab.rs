@@ -14,7 +14,7 @@ use serde_json::json;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{LiveArgs, next_frame, open};
-use crate::new_folder::prepare_new_folder;
+use crate::output_paths::prepare_new_folder;
 
 /// `sdg camera grab`
 #[derive(Debug, Args)]

@@ -16,7 +16,7 @@ use sdg_inputs::BoardPicture;
 
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{self, RequestArgs, next_frame};
-use crate::new_folder::prepare_new_folder;
+use crate::output_paths::prepare_new_folder;
 use crate::web_browser;
 
 /// Default folder of the pictures.
