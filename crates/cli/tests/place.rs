@@ -131,7 +131,12 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
     let cell = folder.path("cell.toml");
     grasp(&cell, &["--place", "table"], 2, &["--place: expected one of shelf, tray, found \"table\""]);
     grasp(&cell, &["--place", "tray"], 2, &["--place: expected tray:1 to tray:4, a cell of the tray"]);
-    grasp(&cell, &["--place", "tray:5"], 2, &["cell of \"tray\": expected 1 to 4, found 5"]);
+    grasp(
+        &cell,
+        &["--place", "tray:5"],
+        2,
+        &["--place: expected tray:1 to tray:4, a cell of the tray, found \"tray:5\""],
+    );
     let first_line = workcell_toml().lines().count() + 1;
     let at = |further: &str| {
         let line = further.lines().position(|line| line.contains("_mm = [")).unwrap();

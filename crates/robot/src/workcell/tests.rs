@@ -124,7 +124,8 @@ fn places_are_where_the_file_says() {
     assert_eq!(cell.place("bin").unwrap().bin_m, Some([0.2, 0.15]));
     for (text, expected) in [
         ("tray", "expected tray:1 to tray:20, a cell of the tray, found \"tray\""),
-        ("tray:21", "expected 1 to 20, found 21"),
+        ("tray:21", "place: expected tray:1 to tray:20, a cell of the tray, found \"tray:21\""),
+        ("shelf:2", "place: expected shelf, which has no cells, found \"shelf:2\""),
         ("tray:x", "expected NAME, or NAME:CELL"),
         ("box", "expected one of shelf, tray, bin, found \"box\""),
     ] {
