@@ -283,7 +283,11 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         if let Some(warning) = taught_words::too_wide(&taught.model) {
             eprintln!("{warning}");
         }
-        println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
+        let size = match bytes.len() {
+            small @ ..1_000_000 => format!("{:.0} kB", small as f64 / 1e3),
+            large => format!("{:.1} MB", large as f64 / 1e6),
+        };
+        println!("wrote {} ({size})", args.out.display());
         if let Some(path) = page {
             println!("report: {}", path.display());
         }

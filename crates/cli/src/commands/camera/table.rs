@@ -10,6 +10,7 @@ use sdg_calibration::{
     ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPlacement, SheetPose, UNCALIBRATED,
     bent_px, focal_cost, guess_camera, locate_sheet, pose_json,
 };
+use sdg_cell::without_minus_zero;
 use sdg_inputs::{BoardPicture, camera_files};
 use serde_json::{Value, json};
 
@@ -202,7 +203,7 @@ fn report(
         writeln!(stdout, "{object}")?;
         return Ok(());
     }
-    let [x, y, z]: [f64; 3] = (pose.translation.vector * 1000.0).into();
+    let [x, y, z]: [f64; 3] = pose.translation.vector.map(|length| without_minus_zero(length * 1000.0, 1)).into();
     writeln!(
         stdout,
         "{}: camera at {frame} ({x:.1}, {y:.1}, {z:.1}) mm, {:.1} degrees from straight down",

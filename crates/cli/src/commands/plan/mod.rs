@@ -69,6 +69,10 @@ pub struct PlanArgs {
 /// Plans a motion, prints it and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
+    // An output path that is not a folder is reported before the work; the folder is created when there is a drawing.
+    if !args.no_drawing && args.out.exists() {
+        sdg_files::prepare_folder(&args.out)?;
+    }
     let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     let mut model = workcell.collision_model(args.opening_mm * 1e-3).map_err(|error| Usage(error.to_string()))?;
     if let Some(Held { diameter_m, length_m }) = args.held_mm {
