@@ -36,6 +36,11 @@ fn resembles_the_part(detection: &GraspDetection) -> bool {
     detection.score >= MIN_ADVISED_SCORE
 }
 
+/// The value for display with this number of decimals: zero in place of small negative numbers, which would be "-0.0".
+pub fn without_minus_zero(value: f64, decimals: i32) -> f64 {
+    if value.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { value }
+}
+
 /// Inputs of the texts about the detections in a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct DetectionWords<'a> {
@@ -56,22 +61,23 @@ impl DetectionWords<'_> {
     /// Position, angle and width of the grasp in pixels, and also in millimetres if the camera is known.
     pub fn position(&self, found: &Found) -> String {
         let grasp = found.detection.grasp;
+        let tenths = |value: f64| without_minus_zero(value, 1);
         let metric = found.pose.zip(self.detector.frame()).map(|(pose, frame)| {
             let name = frame.name();
-            let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
+            let [x, y, z] = pose.position_m.coords.map(|length| tenths(1e3 * length)).into();
             format!(
                 " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
                 1e3 * pose.uncertainty.position_m,
-                pose.yaw.degrees(),
+                tenths(pose.yaw.degrees()),
                 pose.uncertainty.yaw_rad.to_degrees(),
                 1e3 * pose.opening_m
             )
         });
         format!(
             "({:.1}, {:.1}), {:.1}°, {:.1} px wide{}",
-            grasp.x,
-            grasp.y,
-            grasp.angle.degrees(),
+            tenths(grasp.x),
+            tenths(grasp.y),
+            tenths(grasp.angle.degrees()),
             grasp.width,
             metric.unwrap_or_default()
         )
@@ -143,6 +149,12 @@ mod tests {
         found.evidence.as_mut().unwrap().size = -9.0;
         let words = DetectionWords { detector: &detector, picture_size: photo.dimensions().into(), min_score: 0.5 };
         assert_eq!(words.reasons(&found, 1), "it has another size than the surest part in the picture");
+    }
+
+    #[test]
+    fn no_zero_has_a_minus() {
+        let shown = |value: f64| format!("{:.1}", without_minus_zero(value, 1));
+        assert_eq!([-0.049, -0.051, 0.0, 12.34, -3.0].map(shown), ["0.0", "-0.1", "0.0", "12.3", "-3.0"]);
     }
 
     #[test]

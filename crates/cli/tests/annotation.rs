@@ -219,10 +219,10 @@ fn every_format_is_a_demonstration() {
         (shipped("fuel_line", "image.png"), foreign("yolo-pose.txt")),
         (numbered, foreign("boxes_train.npy")),
     ] {
-        let out = folder.path().join("samples");
+        let out = tempfile::tempdir_in(folder.path()).unwrap();
         let demonstration = format!("{}:{}", image.display(), annotation.display());
         let done = Command::new(env!("CARGO_BIN_EXE_sdg"))
-            .args(["augment", "--count", "1", "--demo", &demonstration, "--out", out.to_str().unwrap()])
+            .args(["augment", "--count", "1", "--demo", &demonstration, "--out", out.path().to_str().unwrap()])
             .output()
             .unwrap();
         assert!(done.status.success(), "{demonstration}: {}", String::from_utf8_lossy(&done.stderr));

@@ -106,6 +106,15 @@ fn the_demonstration_is_no_picture_without_the_part() {
     let teach = ["teach", "--model", "S", "--demo", &demo, "--negative", &copy, "--out", &out];
     assert_refused(&teach, 2, &["--negative: expected a picture without the part", "copy.png"]);
     assert!(!fs::exists(&out).unwrap());
+    // With other pixels it is not recognised as the demonstration, but it still shows the part.
+    let mut changed = image::open(&photo).unwrap().into_rgb8();
+    changed.put_pixel(0, 0, image::Rgb([0, 0, 0]));
+    changed.save(&copy).unwrap();
+    let taught = sdg(&teach);
+    let [stdout, stderr] = [taught.stdout, taught.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(stdout.contains("refuses 0 of 1 pictures without the part\n"), "{stdout}");
+    let warning = format!("--negative {copy}: still accepted with ");
+    assert!(stderr.contains(&warning) && stderr.contains("does it show the part?"), "{stderr}");
 }
 
 #[test]
@@ -246,6 +255,9 @@ fn augment_writes_pictures_and_their_list() {
     let out = folder.path().join("samples");
     let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let run = |seed: &str| {
+        if out.exists() {
+            fs::remove_dir_all(&out).unwrap();
+        }
         let output = sdg(&[
             "augment",
             "--demo",

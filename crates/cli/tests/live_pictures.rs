@@ -143,7 +143,9 @@ fn frames_of_a_calibrated_camera_have_its_stored_pixels_and_its_size() {
     let level_of = |further: &[&str]| {
         let output = grab(further);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        level(Path::new(&out))
+        let found = level(Path::new(&out));
+        fs::remove_file(&out).unwrap();
+        found
     };
     let wrist = files.text("wrist.yaml", WRIST_CAMERA);
     assert!(level_of(&[]).abs_diff(200) < 10 && level_of(&["--camera", &wrist]).abs_diff(50) < 10);

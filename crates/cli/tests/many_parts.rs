@@ -58,6 +58,8 @@ fn parts_that_look_alike_are_told() {
     fs::remove_file(&rod_end).unwrap();
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");
+    let unmarked = format!("left out: {}: expected", Path::new(&demos).join("unmarked.png").display());
+    assert!(text.contains(&unmarked) && !text.contains("needs another photo"), "{text}");
     assert!(rod_end.exists());
     assert!(teach(&["--part", "twin", "--seed", "2"]).status.success());
     assert_ne!(record("twin"), twin);
@@ -87,6 +89,8 @@ fn models_remain_if_the_base_weights_are_missing_or_the_marks_are_damaged() {
     let output = sdg(&[&["teach", "--model", "S"][..], &arguments].concat());
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("expected a part that can be taught"), "{error}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("not taught: lever: ") && !text.contains("needs another photo"), "{text}");
     assert!(!model.exists() && Path::new(&out).join("index.html").exists());
     assert_eq!(fs::read(model.with_extension("sdg.before")).unwrap(), before);
 }

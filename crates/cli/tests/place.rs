@@ -131,7 +131,12 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
     let cell = folder.path("cell.toml");
     grasp(&cell, &["--place", "table"], 2, &["--place: expected one of shelf, tray, found \"table\""]);
     grasp(&cell, &["--place", "tray"], 2, &["--place: expected tray:1 to tray:4, a cell of the tray"]);
-    grasp(&cell, &["--place", "tray:5"], 2, &["cell of \"tray\": expected 1 to 4, found 5"]);
+    grasp(
+        &cell,
+        &["--place", "tray:5"],
+        2,
+        &["--place: expected tray:1 to tray:4, a cell of the tray, found \"tray:5\""],
+    );
     let first_line = workcell_toml().lines().count() + 1;
     let at = |further: &str| {
         let line = further.lines().position(|line| line.contains("_mm = [")).unwrap();
@@ -188,4 +193,7 @@ fn a_workcell_is_drawn_from_above() {
     assert!(near([192, 178, 203]) > 2_000, "{}", near([192, 178, 203]));
     refused(&["workcell", "show", &cell, "--grid-mm", "1"], 2, &["--grid-mm: expected a number from 5 to 200"]);
     refused(&["workcell", "show", "/nowhere.toml"], 1, &["/nowhere.toml"]);
+    for out in ["cell.pdf", "-"] {
+        refused(&["workcell", "show", &cell, "--out", out], 2, &["--out: expected a file that ends in .png"]);
+    }
 }

@@ -215,11 +215,11 @@ fn an_arm_that_is_not_there_is_one_line() {
     }
     assert_refused(&["robot", "state"], 2, &["expected --robot ADDRESS"]);
     assert_refused(&["robot", "open", "--robot", "sim"], 2, &["expected the address of an arm"]);
-    assert_refused(
-        &["robot", "open", "--robot", "h", "--width-mm", "90"],
-        2,
-        &["--width-mm: expected 0 to 80, found 90"],
-    );
+    for (width, expected) in
+        [("90", "an opening of 0 to 80 millimetres, found 90"), ("0.04", "metres given as millimetres?")]
+    {
+        assert_refused(&["robot", "open", "--robot", "h", "--width-mm", width], 2, &["--width-mm", expected]);
+    }
     assert_refused(&["robot", "close", "--robot", "h", "--force-n", "0"], 2, &["--force-n: expected 1 to 70"]);
     assert_refused(&["robot", "home", "--robot", "h"], 2, &["expected --workcell FILE"]);
     assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);
@@ -333,6 +333,8 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let asked = sdg(&grasp);
     let stderr = String::from_utf8(asked.stderr).unwrap();
     assert!(asked.status.success() && stderr.ends_with("nothing was moved\n"), "{stderr}");
+    let line: Value = serde_json::from_slice(&asked.stdout).unwrap();
+    assert_eq!((&line["moved"], &line["held"]), (&false.into(), &false.into()), "{line}");
 
     let done = sdg(&[&grasp[..], &["--yes"]].concat());
     let stderr = String::from_utf8(done.stderr).unwrap();

@@ -73,7 +73,7 @@ impl AnnotationFile {
     /// Prints the entries for an image that do not mark a part.
     pub fn report_skipped(&self, image: &ImageFacts) {
         for foreign in Annotation::passed_over(&self.bytes, image) {
-            eprintln!("{}: skipped {foreign}", self.path.display());
+            sdg_files::print_stderr(format_args!("{}: skipped {foreign}\n", self.path.display()));
         }
     }
 

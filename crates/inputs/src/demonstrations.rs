@@ -21,7 +21,8 @@ pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstrat
     // Objects without a grasp are boxes that another tool or person made.
     if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
         for other in objects.extract_if(.., |object| object.grasp.is_none()) {
-            eprintln!("{}: skipped `{}`, which has no grasp", annotation_path.display(), other.label);
+            let path = annotation_path.display();
+            sdg_files::print_stderr(format_args!("{path}: skipped `{}`, which has no grasp\n", other.label));
         }
     }
     if objects.len() != 1 {

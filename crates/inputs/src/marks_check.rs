@@ -44,10 +44,10 @@ impl MarkedPhoto<'_> {
     /// Reports an applied orientation. Called after all fallible steps.
     fn report_orientation(&self, is_turned: bool) {
         if is_turned {
-            eprintln!(
-                "{}: rotated as its Exif orientation says; the marks are read on the rotated photo",
+            sdg_files::print_stderr(format_args!(
+                "{}: rotated as its Exif orientation says; the marks are read on the rotated photo\n",
                 self.photo.display()
-            );
+            ));
         }
     }
 

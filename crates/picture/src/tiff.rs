@@ -484,6 +484,15 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_32_bits_are_unsupported_and_not_damaged() {
+        // One channel of floating-point numbers: sample format 3.
+        let tags = vec![(BITS_PER_SAMPLE, vec![32]), (339, vec![3])];
+        let page = TestPage { size: [4, 3], samples: vec![0; 4 * 4 * 3], is_gray: true, tags };
+        let told = decoded(&file(&[page], false)).unwrap_err().to_string();
+        assert!(told.starts_with("unsupported kind of TIFF image: ") && told.contains("8 bits per channel"), "{told}");
+    }
+
+    #[test]
     fn tags_of_a_page_and_values_of_a_tag_are_bounded() {
         let most = MAX_ENTRIES as usize;
         for (count, is_read) in [(most, true), (most + 1, false)] {

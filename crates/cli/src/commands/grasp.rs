@@ -206,6 +206,9 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         };
         if confirm(&question, args.yes)? == Consent::Refused {
             eprintln!("nothing was moved");
+            if args.json {
+                println!("{}", json_line(&task.refused_record(address.unwrap_or("sim"), clock::elapsed_secs()))?);
+            }
             return Ok(None);
         }
     }

@@ -60,8 +60,17 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
             let ([first, second], [there, back]) = (findings.names(pair), pair.scores);
             println!("look alike: {first} and {second} ({there:.2}, {back:.2})");
         }
-        for (name, why) in findings.need_photo.iter().chain(&findings.left_out) {
+        for (name, outcome) in &findings.parts {
+            if let PartOutcome::Failed { why } = outcome {
+                println!("not taught: {name}: {why}");
+            }
+        }
+        // Parts without a model are among them as well.
+        for (name, why) in findings.need_photo.iter().filter(|(name, _)| findings.taught.contains(name)) {
             println!("needs another photo: {name}: {why}");
+        }
+        for (photo, why) in &findings.left_out {
+            println!("left out: {photo}: {why}");
         }
         println!("report: {}", report.display());
     }

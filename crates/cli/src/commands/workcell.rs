@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use sdg_cell::{Reach, WorkcellMap};
 
 use crate::exit::Outcome;
+use crate::output_paths::check_ending;
 
 /// The commands of `sdg workcell`.
 #[derive(Debug, Subcommand)]
@@ -28,7 +29,7 @@ pub struct ShowArgs {
     /// Size of a square of the map of reach
     #[arg(long, value_name = "MM", default_value_t = 25.0)]
     pub grid_mm: f64,
-    /// The picture to write
+    /// The PNG file to write
     #[arg(long, value_name = "FILE", default_value = "workcell.png")]
     pub out: PathBuf,
 }
@@ -44,6 +45,7 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
             return Err(crate::exit::Usage(why).into());
         }
     }
+    check_ending("--out", &args.out, "png")?;
     let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     sdg_files::check_writable(&args.out)?;
     let map = WorkcellMap::around(&workcell);
