@@ -45,6 +45,14 @@ impl Annotation {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
     }
 
+    /// The tight box around all marks.
+    pub fn extent(&self) -> BoundingBox {
+        let outline = self.outline.iter().flat_map(|outline| outline.vertices.iter().copied());
+        let ends = self.grasp.iter().flat_map(|grasp| [grasp.start, grasp.end]);
+        let corners = self.bbox.corners().into_iter();
+        BoundingBox::around(corners.chain(outline).chain(ends)).unwrap_or(self.bbox)
+    }
+
     /// The grasp line, or an error with the reason why it is needed.
     ///
     /// # Errors

@@ -199,6 +199,23 @@ impl GraspModel {
         read_sync(self.detect_async(image, verification))
     }
 
+    /// As [`Self::detect`] without a region, in an image cut from the middle of a picture of `whole` (width and height)
+    /// pixels: the part's possible sizes and the network's input are those for the whole picture.
+    ///
+    /// # Errors
+    /// An image that is too small.
+    pub fn detect_in_middle(
+        &self,
+        image: &RgbImage,
+        whole: [u32; 2],
+        verification: Verification,
+    ) -> Result<Vec<GraspDetection>> {
+        let window = SearchWindow::middle_of(whole, image.dimensions().into());
+        let mut found = read_sync(self.find_in(image, &window, verification, |_| true))?;
+        found.iter_mut().for_each(|found| window.in_window(found));
+        Ok(found.into_iter().map(|found| found.detection).collect())
+    }
+
     /// [`Self::detect`], asynchronous; for browsers, which give access to results of a graphics card only in this way.
     ///
     /// # Errors

@@ -54,6 +54,13 @@ impl SearchWindow {
         Self { rect: PixelRect { left: 0, top: 0, width, height }, whole: [width, height] }
     }
 
+    /// The window of this width and height in the middle of an image of size `whole`.
+    pub(crate) fn middle_of(whole: [u32; 2], [width, height]: [u32; 2]) -> Self {
+        let from = |whole: u32, side: u32| whole.saturating_sub(side) / 2;
+        let rect = PixelRect { left: from(whole[0], width), top: from(whole[1], height), width, height };
+        Self { rect, whole }
+    }
+
     /// The window of an image of size `whole` that contains everything needed to evaluate parts in `bounds`, in pixels
     /// of the image; `region` is the region given by the user.
     ///
@@ -119,24 +126,34 @@ impl SearchWindow {
 
     /// Moves a detection of the window to pixels of the whole image.
     pub(crate) fn in_whole(&self, found: &mut Found) {
-        let shift = self.whole_from_window();
-        let PlanarSimilarity { tx, ty, .. } = shift;
-        let Found { detection, placement } = found;
-        if (tx, ty) != (0.0, 0.0) {
-            let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
-            detection.bbox = BoundingBox { x1: x1 + tx, y1: y1 + ty, x2: x2 + tx, y2: y2 + ty };
-            detection.keypoints.iter_mut().for_each(|(point, _)| *point = shift.apply(point));
-            detection.outline = detection.outline.as_ref().map(|outline| outline.transformed(&shift));
-            detection.grasp.x += tx;
-            detection.grasp.y += ty;
-            if let Some(placement) = placement {
-                placement.image_from_cutout = shift.compose(&placement.image_from_cutout);
-                placement.image_from_marks = shift.compose(&placement.image_from_marks);
-            }
-        }
-        let [width, height] = self.whole.map(f64::from);
-        detection.bbox = detection.bbox.clip(width, height);
+        moved(found, &self.whole_from_window(), self.whole);
     }
+
+    /// Moves a detection back to pixels of the window.
+    pub(crate) fn in_window(&self, found: &mut Found) {
+        let PlanarSimilarity { tx, ty, .. } = self.whole_from_window();
+        moved(found, &PlanarSimilarity::translation(-tx, -ty), [self.rect.width, self.rect.height]);
+    }
+}
+
+/// Shifts a detection into an image of this width and height.
+fn moved(found: &mut Found, shift: &PlanarSimilarity, size: [u32; 2]) {
+    let &PlanarSimilarity { tx, ty, .. } = shift;
+    let Found { detection, placement } = found;
+    if (tx, ty) != (0.0, 0.0) {
+        let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
+        detection.bbox = BoundingBox { x1: x1 + tx, y1: y1 + ty, x2: x2 + tx, y2: y2 + ty };
+        detection.keypoints.iter_mut().for_each(|(point, _)| *point = shift.apply(point));
+        detection.outline = detection.outline.as_ref().map(|outline| outline.transformed(shift));
+        detection.grasp.x += tx;
+        detection.grasp.y += ty;
+        if let Some(placement) = placement {
+            placement.image_from_cutout = shift.compose(&placement.image_from_cutout);
+            placement.image_from_marks = shift.compose(&placement.image_from_marks);
+        }
+    }
+    let [width, height] = size.map(f64::from);
+    detection.bbox = detection.bbox.clip(width, height);
 }
 
 /// Length and width of a polygon: the largest distance between two points, and the smallest distance between two

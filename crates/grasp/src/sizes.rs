@@ -82,7 +82,7 @@ pub(crate) fn scaling(factor: f64) -> PlanarSimilarity {
 mod tests {
     use super::*;
     #[cfg(feature = "teach")]
-    use crate::{drawn_part, model::Verification};
+    use crate::{detection::GraspDetection, drawn_part, model::Verification};
 
     const TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
 
@@ -134,6 +134,21 @@ mod tests {
             let at_it = found.iter().find(|detection| (detection.grasp.center() - center).norm() < 2.0);
             at_it.unwrap_or_else(|| panic!("{center}: {found:?}")).evidence.unwrap().size
         })
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
+    fn the_middle_of_a_picture_shows_parts_of_that_picture_s_size() {
+        let model = drawn_part::model([320, 240]);
+        // Of a picture with twice the photo's pixels per side.
+        let pose = scaling(2.0).compose(&drawn_part::at(80.0, 60.0, 20.0));
+        let middle = drawn_part::picture([320, 240], &[pose]);
+        let center = drawn_part::line().transformed(&pose).center();
+        let is_there = |found: Vec<GraspDetection>| {
+            found.iter().any(|found| found.is_accepted() && (found.grasp.center() - center).norm() < 2.0)
+        };
+        assert!(is_there(model.detect_in_middle(&middle, [640, 480], Verification::ByShape).unwrap()));
+        assert!(!is_there(model.detect(&middle, Verification::ByShape).unwrap()));
     }
 
     #[cfg(feature = "teach")]

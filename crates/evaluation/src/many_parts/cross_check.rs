@@ -5,8 +5,12 @@ use image::RgbImage;
 use rayon::prelude::*;
 use sdg_grasp::{Device, Verification};
 
+use super::folder::PartDemonstrations;
 use super::part_store::PartStore;
 use crate::labelled_pictures::DEFAULT_MIN_SCORE;
+
+/// Maximum number of photos in memory: 0.6 GB of photos of 12 megapixels.
+pub(super) const PHOTOS_AT_ONCE: usize = 16;
 
 /// The best score of each model on each photo.
 #[derive(Debug, Clone)]
@@ -25,22 +29,49 @@ pub struct LookAlikePair {
 }
 
 impl CrossCheck {
-    /// Runs every model on every photo; `done` is called after each model.
+    /// Runs every model on the first photo of every part. [`PHOTOS_AT_ONCE`] photos are read at a time, and `seen` gets
+    /// each of them in order; after every model, `done` gets its name and the number of these photos.
     ///
     /// # Errors
-    /// Models cannot be read, or detection fails.
-    pub fn run(store: &PartStore, names: &[&str], photos: &[RgbImage], done: &(dyn Fn(&str) + Sync)) -> Result<Self> {
-        let row = |name: &&str| -> Result<Vec<f64>> {
-            let model = sdg_inputs::read_model(&store.model_file(name), &Device::flex())?;
-            let best = |photo: &RgbImage| -> Result<f64> {
-                let found = model.detect(photo, Verification::ByShape).with_context(|| (*name).to_owned())?;
-                Ok(found.iter().map(|detection| detection.score).fold(0.0, f64::max))
+    /// Photos or models cannot be read, or detection fails.
+    pub fn run(
+        store: &PartStore,
+        parts: &[&PartDemonstrations],
+        seen: &mut dyn FnMut(&RgbImage),
+        done: &(dyn Fn(&str, usize) + Sync),
+    ) -> Result<Self> {
+        Self::run_in_rounds(store, parts, PHOTOS_AT_ONCE, seen, done)
+    }
+
+    fn run_in_rounds(
+        store: &PartStore,
+        parts: &[&PartDemonstrations],
+        photos_at_once: usize,
+        seen: &mut dyn FnMut(&RgbImage),
+        done: &(dyn Fn(&str, usize) + Sync),
+    ) -> Result<Self> {
+        let mut scores = vec![Vec::with_capacity(parts.len()); parts.len()];
+        for round in parts.chunks(photos_at_once) {
+            let photos = round.iter().map(|part| part.first_photo()).collect::<Result<Vec<RgbImage>>>()?;
+            for photo in &photos {
+                seen(photo);
+            }
+            let row = |part: &&PartDemonstrations| -> Result<Vec<f64>> {
+                let model = sdg_inputs::read_model(&store.model_file(&part.name), &Device::flex())?;
+                let best = |photo: &RgbImage| -> Result<f64> {
+                    let found = model.detect(photo, Verification::ByShape).with_context(|| part.name.clone())?;
+                    Ok(found.iter().map(|detection| detection.score).fold(0.0, f64::max))
+                };
+                let scores = photos.iter().map(best).collect::<Result<Vec<f64>>>()?;
+                done(&part.name, photos.len());
+                Ok(scores)
             };
-            let scores = photos.iter().map(best).collect::<Result<Vec<f64>>>()?;
-            done(name);
-            Ok(scores)
-        };
-        Ok(Self { scores: names.par_iter().map(row).collect::<Result<_>>()? })
+            let rows = parts.par_iter().map(row).collect::<Result<Vec<Vec<f64>>>>()?;
+            for (all, of_round) in scores.iter_mut().zip(rows) {
+                all.extend(of_round);
+            }
+        }
+        Ok(Self { scores })
     }
 
     /// Whether a model finds its part in its own photo.
@@ -68,7 +99,41 @@ impl LookAlikePair {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+    use std::path::Path;
+
+    use sdg_grasp::{ModelKind, TeachOptions, teach};
+
     use super::*;
+    use crate::many_parts::{PartOutcome, PartRecord};
+
+    #[test]
+    fn photos_read_one_after_the_other_have_the_scores_of_photos_read_at_once() {
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations");
+        let folder = tempfile::tempdir().unwrap();
+        let store = PartStore::open(folder.path()).unwrap();
+        let parts = ["key", "rod_end"].map(|name| {
+            let files = vec![(shipped.join(name).join("image.png"), shipped.join(name).join("annotation.json"))];
+            let part = PartDemonstrations { name: name.to_owned(), files, symmetry: None };
+            let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+            let taught = teach(&part.read().unwrap(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
+            let outcome = PartOutcome::Failed { why: "not tested".to_owned() };
+            let record = PartRecord { key: serde_json::Value::Null, outcome };
+            store.write(name, Some(taught.model.to_bytes().unwrap().as_slice()), &record).unwrap();
+            part
+        });
+        let parts: Vec<&PartDemonstrations> = parts.iter().collect();
+        let [one_by_one, at_once] = [1, 2].map(|photos_at_once| {
+            let mut num_seen = 0;
+            let mut seen = |photo: &RgbImage| num_seen += usize::from(photo.dimensions() == (640, 480));
+            let done = |_: &str, photos: usize| assert_eq!(photos, photos_at_once);
+            let check = CrossCheck::run_in_rounds(&store, &parts, photos_at_once, &mut seen, &done).unwrap();
+            assert_eq!(num_seen, 2);
+            check
+        });
+        assert_eq!(one_by_one.scores, at_once.scores);
+        assert!(at_once.finds_own(0) && at_once.finds_own(1) && at_once.look_alikes().is_empty(), "{at_once:?}");
+    }
 
     #[test]
     fn a_pair_looks_alike_where_either_model_accepts_the_other() {

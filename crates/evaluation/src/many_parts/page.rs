@@ -1,6 +1,7 @@
 //! The page of many parts.
 
 use image::RgbImage;
+use image::imageops::{self, FilterType};
 use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, Table, Tone, contact_sheet};
 
 use super::findings::Findings;
@@ -16,7 +17,7 @@ const MAX_PHOTOS: usize = 200;
 const PHOTO_WIDTH: u32 = 360;
 
 /// The page: look-alikes, parts that need another photo, and the results of each part. `photos` are those of the taught
-/// parts.
+/// parts, reduced or not.
 pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
     let taught = findings.taught.len();
     let mut report = Report::new(format!("{taught} parts taught"))
@@ -52,6 +53,17 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
         .section(all_parts(findings, photos))
         .section(Section::new("This run").facts([("machine", machine())]).command(command))
         .footer(FOOTER)
+}
+
+/// A photo as large as the page shows it: the photos of all parts are in memory together.
+pub(super) fn thumbnail(photo: &RgbImage) -> RgbImage {
+    let (width, height) = photo.dimensions();
+    if width <= PHOTO_WIDTH {
+        return photo.clone();
+    }
+    let ratio = f64::from(PHOTO_WIDTH) / f64::from(width);
+    let height = ((f64::from(height) * ratio).round() as u32).max(1);
+    imageops::resize(photo, PHOTO_WIDTH, height, FilterType::Triangle)
 }
 
 fn count(count: usize, what: &str) -> KeyFigure {

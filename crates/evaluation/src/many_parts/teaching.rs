@@ -7,9 +7,10 @@ use image::RgbImage;
 use sdg_grasp::TeachOptions;
 use serde_json::{Value, json};
 
-use super::cross_check::CrossCheck;
+use super::cross_check::{CrossCheck, PHOTOS_AT_ONCE};
 use super::findings::Findings;
 use super::folder::PartDemonstrations;
+use super::page::thumbnail;
 use super::part_store::{PartOutcome, PartRecord, PartStore};
 use super::teach::teach_part;
 use crate::progress::Progress;
@@ -78,7 +79,8 @@ impl PartTeaching<'_> {
         }))
     }
 
-    /// Runs the model of each taught part on the first photos of all taught parts. Returns the findings and the photos.
+    /// Runs the model of each taught part on the first photos of all taught parts. Returns the findings, and the photos
+    /// reduced for the page.
     ///
     /// # Errors
     /// Photos or models cannot be read, or detection fails.
@@ -92,11 +94,13 @@ impl PartTeaching<'_> {
         let is_taught = |name: &str| {
             outcomes.iter().any(|(known, outcome)| known == name && matches!(outcome, PartOutcome::Taught { .. }))
         };
-        let taught: Vec<_> = parts.iter().filter(|part| is_taught(&part.name)).collect();
-        let names: Vec<&str> = taught.iter().map(|part| part.name.as_str()).collect();
-        let photos: Vec<RgbImage> = taught.iter().map(|part| part.first_photo()).collect::<Result<_>>()?;
-        let done = |name: &str| progress.unit_done(&format!("{name}: run on {} photos", photos.len()));
-        let check = CrossCheck::run(self.store, &names, &photos, &done)?;
-        Ok((Findings::new(outcomes, check, left_out), photos))
+        let taught: Vec<&PartDemonstrations> = parts.iter().copied().filter(|part| is_taught(&part.name)).collect();
+        let further_rounds = taught.len().div_ceil(PHOTOS_AT_ONCE).saturating_sub(1);
+        progress.expect(further_rounds * taught.len());
+        let mut thumbnails = Vec::with_capacity(taught.len());
+        let mut seen = |photo: &RgbImage| thumbnails.push(thumbnail(photo));
+        let done = |name: &str, photos: usize| progress.unit_done(&format!("{name}: run on {photos} photos"));
+        let check = CrossCheck::run(self.store, &taught, &mut seen, &done)?;
+        Ok((Findings::new(outcomes, check, left_out), thumbnails))
     }
 }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::{Rgb, RgbImage};
-use sdg_demonstration::Demonstration;
-use sdg_geometry::PlanarSimilarity;
+use nalgebra::Point2;
+use sdg_demonstration::{Annotation, Demonstration};
+use sdg_geometry::{GraspLine, PlanarSimilarity, Polygon};
 
 use super::*;
 use crate::drawn_part::{self, at, line};
@@ -134,6 +135,35 @@ fn however_long_searches_take_a_part_is_reported_only_where_it_is() {
         assert!((taken[0]..15).all(is_followed), "{taken:?}");
         // A search of a frame without the part may have to end first.
         assert!((21 + 2 * 9..FRAMES).all(is_followed), "{taken:?}");
+    }
+}
+
+/// A photo of a wire frame whose upper left corner is at whole pixels (x, y). Its arms are parallel to the picture's
+/// axes and so thin that no point of a grid of 16 × 16 over its box lies on them.
+fn wire_frame(x: f64, y: f64) -> Demonstration {
+    let arms = [(0.0, 0.0), (5.0, 0.0), (5.0, 175.0), (175.0, 175.0), (175.0, 60.0), (180.0, 60.0), (180.0, 180.0)];
+    let corners = arms.into_iter().chain([(0.0, 180.0)]).map(|(right, down)| Point2::new(x + right, y + down));
+    let outline = Polygon { vertices: corners.collect() };
+    let mask = outline.rasterize(SIZE[0], SIZE[1]);
+    let image =
+        RgbImage::from_fn(SIZE[0], SIZE[1], |x, y| Rgb(if mask.get(x, y) { [50, 50, 55] } else { [190, 185, 175] }));
+    let grasp = Some(GraspLine::new(Point2::new(x + 90.0, y + 175.0), Point2::new(x + 90.0, y + 180.0)));
+    let annotation =
+        Annotation { label: "wire".into(), bbox: outline.bounds(), grasp, jaw_width: None, outline: Some(outline) };
+    Demonstration { image, annotation }
+}
+
+#[test]
+fn a_still_part_of_thin_arms_is_one_track() {
+    let model = drawn_part::taught(&[wire_frame(60.0, 40.0)]);
+    let still = Arc::new(wire_frame(75.0, 50.0).image);
+    let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
+    // One search follows another.
+    tracker.config.search_every = PERIOD;
+    let all = run_with_searches(&mut tracker, (0..10).map(|_| Arc::clone(&still)), std::iter::repeat(1));
+    for (number, parts) in all.iter().enumerate().skip(1) {
+        assert_eq!(parts.len(), 1, "frame {number}: {parts:?}");
+        assert!((parts[0].detection.grasp.center() - Point2::new(165.0, 227.5)).norm() < 1.0, "frame {number}");
     }
 }
 
