@@ -364,7 +364,8 @@ mod tests {
     #[test]
     fn a_model_of_a_part_that_is_small_in_a_large_photo_is_usable() {
         let demonstrations = [key_on_a_table(4032, 3024)];
-        let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
         let model = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
         let figures = HeldBackFigures::of(&model, &demonstrations, 1).unwrap();
         assert_eq!(figures.failure(), None);
