@@ -63,7 +63,7 @@ test-compile: setup ## Compiles every test
 	fi
 
 # Uses nextest if it is installed, otherwise cargo's own runner. nextest does not run the examples in the docs.
-test: setup ## Runs every test
+test: setup ## Runs the tests, except those with targets of their own
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run $(RELEASE) --locked --workspace $(TESTS_ALONE); \
 	else \

@@ -25,7 +25,15 @@ fail() {
 }
 
 python=$peers/venv/bin/python
-tests=${TESTS:-bytes arm pictures services faults latency memory fast attack}
+tests=${TESTS:-bytes arm pictures services faults latency memory fast}
+if [ -z "${TESTS:-}" ]; then
+    # It records packets on the loopback interface.
+    if [ "$(id -u)" = 0 ]; then
+        tests="$tests attack"
+    else
+        echo "attack is left out: it needs root; TESTS=attack runs it alone"
+    fi
+fi
 for name in $tests; do
     case $name in
     bytes)

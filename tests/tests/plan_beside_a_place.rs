@@ -59,5 +59,15 @@ fn a_part_at_a_place_is_not_planned_for_and_not_drawn() {
         let seen = finder.seen().unwrap();
         assert!(distance_m(seen, &other) < IN_PART_M, "{seen:?}");
         assert!((seen.z_m[0] + grasp_height_m - other.base_from_tcp.translation.z).abs() < 1e-9, "{seen:?}");
+        // Also near the place, where a detection from afar may be wrong; the part in the place is another part.
+        let mut beside = best.base_from_tcp;
+        beside.translation.x += 0.04;
+        let nearest: GraspTarget = finder.find_nearest(&mut arm, &beside).unwrap().unwrap();
+        assert!((nearest.base_from_tcp.translation.vector - p.vector).norm() > 0.2, "{nearest:?}");
+        let near_place = |part: &GraspTarget| (part.base_from_tcp.translation.vector - p.vector).norm() < 0.02;
+        assert!(PartFinder::<PlannedArm>::others(&finder).iter().any(near_place));
+        // A part that was put down is searched in its place.
+        let placed: GraspTarget = finder.find_nearest(&mut arm, &best.base_from_tcp).unwrap().unwrap();
+        assert!(near_place(&placed), "{placed:?}");
     }
 }

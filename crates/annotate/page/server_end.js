@@ -23,9 +23,11 @@ const isUnsaved = (target) => target.saving || target.saved.lost || target.saved
 const kept = () => JSON.parse(stored(keptKey()) ?? "{}");
 let own = [];
 
-/** Stores marks that the server has not received, in place of those that this tab has stored before. */
+/** Stores marks that the server has not received, in place of those that this tab has stored before. While the server answers, marks of other tabs that it has are removed. */
 function keep() {
   const all = kept();
+  // Marks of another tab that have arrived are not waiting: sent again later, they would revoke an undo.
+  for (const { name, sent } of isLost() ? [] : state.images) if (all[name] && textOf(all[name].marks) === textOf(JSON.parse(sent))) delete all[name];
   for (const name of own) delete all[name];
   const unsaved = state.images.filter(isUnsaved);
   own = unsaved.map(({ name }) => name);
@@ -130,6 +132,7 @@ async function adoptChanges() {
     const view = session.images.find(({ id }) => id === target.id);
     if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
   }
+  keep();
   changed();
 }
 for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);

@@ -99,7 +99,7 @@ export function adoptModels({ models, region }) {
   const used = (from) => JSON.stringify([currentModel(from)?.id, from.region]);
   const isOther = models.length === state.models.length && used({ models, region }) !== used(state);
   Object.assign(state, { models, region, hasModel: Boolean(currentModel({ models })) });
-  if (isOther && !isRunning()) searchAgain({ compares: false });
+  if (isOther) searchAgain({ compares: false });
 }
 
 export const size = () => [image().width, image().height];

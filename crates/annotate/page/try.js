@@ -3,7 +3,7 @@
 import { api, present } from "./api.js";
 import { button, by, element, setText, shows } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
-import { adopt } from "./editing.js";
+import { adopt, textOf } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
 import { boundsOf } from "./geometry.js";
 import { renderHelps } from "./helps.js";
@@ -120,10 +120,12 @@ async function accept(marks, { correct }) {
     const view = await api.accept(target.id, marks);
     state.images.push(adopt(view));
     target.became = view.id;
-    if (correct) {
+    // The picture may have kept other marks than those shown; they are not taught unseen.
+    const isOther = textOf(view.marks) !== textOf(marks);
+    if (correct || isOther) {
       openTab("mark");
       openImage(state.images.length - 1);
-      toast("Correct the marks; they are saved as you go.");
+      toast((isOther && view.note) || "Correct the marks; they are saved as you go.");
     } else if (isQuick()) teach();
     else toast(view.note ?? "Now a demonstration. Teach again to learn from it.");
   } catch (error) {

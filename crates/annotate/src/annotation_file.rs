@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! photo.png ─┬─ photo.coco.json   where marks are written if photo.json is another tool's file
-//!            └─ photo.json        where marks are written otherwise
+//!            ├─ photo.json        where marks are written otherwise
+//!            └─ photo.txt         YOLO-pose, also in the folder labels of a dataset: only read
 //! ```
 //!
 //! A file with more information than the page would write back (LabelMe's flags, further objects, further pictures) is
@@ -12,8 +13,8 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use sdg_demonstration::{Annotation, ImageFacts};
-use sdg_files::write_atomically;
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
+use sdg_files::{data_yaml_of, marks_of_photo, other_npy_of, write_atomically};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
@@ -37,8 +38,8 @@ pub struct Opened {
     pub note: Option<String>,
 }
 
-/// Reads the marks of a picture from `annotation` (default: the picture's name with `.json`), or from the file beside
-/// it with `.coco.json` if that exists.
+/// Reads the marks of a picture from `annotation`, or from the file beside it with `.coco.json` if that exists; without
+/// `annotation`, from the first file of [`marks_of_photo`].
 ///
 /// # Errors
 /// The file exists but cannot be read, is no annotation, or belongs to another picture.
@@ -47,31 +48,45 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
     let spare = own.with_extension("coco.json");
     let file_name = picture.file_name().and_then(|name| name.to_str());
     let facts = ImageFacts { width: size[0], height: size[1], file_name };
-    for path in [&spare, &own] {
+    let searched = annotation.map_or_else(|| marks_of_photo(picture), |_| vec![spare.clone(), own.clone()]);
+    for path in &searched {
         let Some(bytes) = read_if_there(path)? else { continue };
+        let format = AnnotationFormat::of(&bytes);
+        let is_named = [&spare, &own].contains(&path);
+        // A text that was not named may be about anything, and is empty for a picture without the part.
+        if !is_named && format != Ok(AnnotationFormat::YoloPose) {
+            continue;
+        }
         let complain = |source| Error::Demonstration { name: path.display().to_string(), source };
-        let objects = match Annotation::read(&bytes, &facts) {
+        let second = match format {
+            Ok(AnnotationFormat::YoloPose) => data_yaml_of(path),
+            Ok(AnnotationFormat::OpenDr) => other_npy_of(path),
+            _ => None,
+        };
+        let second = second.map(|path| read_if_there(&path)).transpose()?.flatten();
+        let objects = match Annotation::read_with(&bytes, second.as_deref(), &facts) {
             Err(sdg_demonstration::Error::NoObject { .. }) => Vec::new(),
             read => read.map_err(complain)?,
         };
         let writable = is_ours(&bytes);
-        let target = if writable { path.clone() } else { spare.clone() };
+        let other = if is_named { &spare } else { &own };
+        let target = if writable { path } else { other };
         let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let note = match (objects.len(), writable) {
             (0 | 1, true) => None,
-            (0 | 1, false) => Some(format!("{} is kept unchanged; changes go to {}.", named(path), named(&target))),
+            (0 | 1, false) => Some(format!("{} is kept unchanged; changes go to {}.", named(path), named(target))),
             (count, _) => Some(format!(
                 "{} marks {count} objects; the first is shown. Changes go to {}.",
                 named(path),
-                named(&spare)
+                named(other)
             )),
         };
-        let target = if objects.len() > 1 { spare.clone() } else { target };
+        let target = if objects.len() > 1 { other } else { target };
         let first = objects.first();
         return Ok(Opened {
             label: first.map(|object| object.label.clone()),
             marks: first.map(Marks::of).unwrap_or_default(),
-            path: target,
+            path: target.clone(),
             found: Some(path.clone()),
             note,
         });
@@ -184,6 +199,32 @@ mod tests {
         save(&opened.path, &marks(), "bar", "photo.png", SIZE).unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("photo.json")).unwrap(), labelme);
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks(), "the newer file is the one that counts");
+    }
+
+    #[test]
+    fn yolo_marks_beside_the_photo_or_in_the_dataset_are_read_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for inner in ["images", "labels"] {
+            fs::create_dir_all(at(inner)).unwrap();
+        }
+        fs::write(at("data.yaml"), "kpt_shape: [2, 3]\nnames: [rod, bar]\n").unwrap();
+        let picture = at("images/photo.png");
+        for (labels, row) in [("labels/photo.txt", "1 0.3 0.4 0.5 0.4\n"), ("images/photo.txt", "1 0.3 0.4 0.4 0.4\n")]
+        {
+            fs::write(at(labels), row).unwrap();
+            let opened = open(&picture, None, SIZE).unwrap();
+            assert_eq!((opened.label.as_deref(), opened.found), (Some("bar"), Some(at(labels))));
+            assert_eq!(opened.path, at("images/photo.json"));
+            assert!(opened.note.unwrap().contains("photo.txt is kept unchanged; changes go to photo.json"));
+        }
+        save(&at("images/photo.json"), &marks(), "bar", "photo.png", SIZE).unwrap();
+        assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks());
+        // The labels of a picture without the part, and another text.
+        for text in ["", "photo of the first part\n"] {
+            fs::write(at("labels/other.txt"), text).unwrap();
+            assert_eq!(open(&at("images/other.png"), None, SIZE).unwrap().found, None, "{text}");
+        }
     }
 
     #[test]

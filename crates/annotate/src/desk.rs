@@ -187,7 +187,7 @@ mod tests {
 
     use super::*;
     use crate::picture::png;
-    use crate::region::Region;
+    use crate::region::{Region, Searched};
     use crate::session::SessionOptions;
     use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingMaterial, TeachingStep};
 
@@ -213,7 +213,7 @@ mod tests {
             Ok(())
         }
 
-        fn open(&self, _: &[u8], _: &TaughtSummary) -> Taught {
+        fn open(&self, _: &[u8], _: &TaughtSummary, _: Option<Searched>) -> Taught {
             Err("no teacher".into())
         }
     }

@@ -64,7 +64,7 @@ pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictu
 pub use marks::{GraspMarks, Marks};
 pub use project_file::project_of_photo;
 pub use recent::{RecentProject, RecentProjects};
-pub use region::Region;
+pub use region::{Region, Searched};
 pub use sdg_demonstration::ModelKind;
 pub use server::Server;
 pub use session::{Session, SessionOptions};

@@ -6,6 +6,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::IMAGE_EXTENSIONS;
+use sdg_files::marks_of_photo;
 
 /// Name of a project's file in its folder, and extension of the file of a photo's project.
 pub const PROJECT_FILE: &str = "sdg-project.json";
@@ -104,8 +105,8 @@ pub fn free_numbered_except(path: &Path, names: &[String]) -> PathBuf {
         1 => path.to_owned(),
         _ => path.with_file_name(format!("{}-{n}.{}", stem.to_string_lossy(), extension.to_string_lossy())),
     };
-    let records = ["json", "coco.json", PROJECT_FILE];
-    let has_records = |path: &Path| records.iter().any(|extension| path.with_extension(extension).exists());
+    let records = |path: &Path| marks_of_photo(path).into_iter().chain([path.with_extension(PROJECT_FILE)]);
+    let has_records = |path: &Path| records(path).any(|record| record.exists());
     let pictures = picture_stems(path);
     let taken = |path: &Path| {
         path.exists()

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
+use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration, sample_size};
 use sdg_geometry::{GraspLine, PlanarGrasp};
 use sdg_report::{Color, Pen, draw_grasp_jaws, draw_polygon};
 
@@ -11,7 +11,7 @@ use crate::gripper::Gripper;
 use crate::marks::Marks;
 use crate::picture::jpeg;
 
-/// Longer side of a sample on the sheet.
+/// Longer side of a sample on the sheet; the shorter one has the least side of a sample or more.
 const SAMPLE_PX: f64 = 400.0;
 /// Line width of the marks on a sample.
 const PEN_PX: f64 = 1.6;
@@ -73,9 +73,9 @@ impl Previews {
         let demonstration = demonstration()?;
         let jaw_width = jaw_width(&demonstration);
         let (width, height) = demonstration.image.dimensions();
-        let scale = (SAMPLE_PX / f64::from(width.max(height))).min(1.0);
-        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
-        let config = AugmentationConfig::default().with_output_size(scaled(width), scaled(height));
+        let shape = f64::from(width.min(height)) / f64::from(width.max(height));
+        let [width, height] = sample_size([width, height], SAMPLE_PX * SAMPLE_PX * shape);
+        let config = AugmentationConfig::default().with_output_size(width, height);
         let name = || format!("sample of picture {}", key.image_id);
         let augmenter = Augmenter::new(&[demonstration], config, key.seed)
             .map_err(|source| Error::Demonstration { name: name(), source })?;

@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::model_versions::Version;
 use crate::names::{PROJECT_FILE, absolute, relative};
 use crate::picture::{Picture, pictures_in};
-use crate::region::Region;
+use crate::region::Searched;
 
 /// Folder of pictures added on the page.
 pub const TRIED_FOLDER: &str = "tried";
@@ -134,15 +134,6 @@ pub struct ProjectFile {
     pub searched: Option<Searched>,
 }
 
-/// The searched region of pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Searched {
-    /// The whole picture, whatever the model's file says.
-    All,
-    Part(Region),
-}
-
 /// A picture that a model was tried on, with the user's statements on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -224,7 +215,8 @@ impl ProjectFile {
     /// returned separately; unreadable ones, and those beyond the maximum number of pictures to try, are not added.
     ///
     /// # Errors
-    /// The folder cannot be read, the file is not a project's file, or marks belong to another picture.
+    /// The folder cannot be read, the file is not a project's file, or marks belong to another picture or to a photo of
+    /// a calibrated camera that an Exif orientation rotates.
     pub fn open(place: &ProjectPlace, frame: PixelFrame) -> Result<(Self, Gone)> {
         let read = Self::read(place)?;
         let is_new = read.is_none();
@@ -271,7 +263,11 @@ impl ProjectFile {
                 continue;
             }
             let Some(picture) = gone.open(&path, frame) else { continue };
-            let is_marked = annotation_file::open(&path, None, picture.size)?.marks.has_object();
+            let is_marked = match annotation_file::open(&path, None, picture.size) {
+                Ok(opened) => opened.marks.has_object(),
+                // The marks of a photo that an Exif orientation rotates may name its upright size.
+                Err(error) => return picture.check_is_markable().and(Err(error)),
+            };
             if is_marked {
                 self.photos.push(name);
             } else {

@@ -21,6 +21,30 @@ pub struct Region {
     pub picture: Option<[u32; 2]>,
 }
 
+/// The searched region of pictures, in place of the region in a model's file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Searched {
+    /// The whole picture.
+    All,
+    /// A part of it.
+    Part(Region),
+}
+
+impl Searched {
+    pub(crate) fn of(region: Option<Region>) -> Self {
+        region.map_or(Self::All, Self::Part)
+    }
+
+    /// The region; `None` for the whole picture.
+    pub fn region(self) -> Option<Region> {
+        match self {
+            Self::All => None,
+            Self::Part(region) => Some(region),
+        }
+    }
+}
+
 impl Region {
     /// # Errors
     /// The region is empty or extends beyond the picture.

@@ -22,7 +22,7 @@ use crate::names::{file_name, free_numbered_except, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::ProjectPlace;
-use crate::region::Region;
+use crate::region::{Region, Searched};
 use crate::session_state::State;
 use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
@@ -245,7 +245,11 @@ impl Session {
         let mut state = self.state();
         let path = self.model_path(&state);
         let summary = state.models.get(id)?.summary.clone();
-        let model = self.teacher.open(&state.models.read(id)?, &summary).map_err(Error::Teacher)?;
+        let bytes = state.models.read(id)?;
+        let open = |searched| self.teacher.open(&bytes, &summary, searched);
+        // The version's own region may not fit the camera's pictures; then the page's applies.
+        let opened = open(None).or_else(|_| open(Some(Searched::of(state.region))));
+        let model = opened.map_err(Error::Teacher)?;
         state.models.use_version(&path, id)?;
         state.region = model.region();
         state.is_model_lost = false;

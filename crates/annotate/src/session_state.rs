@@ -13,9 +13,12 @@ use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::{absolute, file_name, relative};
 use crate::picture::Picture;
-use crate::project_file::{Gone, ProjectFile, ProjectPlace, Searched, Tried};
-use crate::region::Region;
+use crate::project_file::{Gone, ProjectFile, ProjectPlace, Tried};
+use crate::region::{Region, Searched};
 use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
+
+/// The note on a picture that keeps the marks that it had before it was added.
+const MARKS_KEPT: &str = "This picture was marked before; these marks are kept.";
 
 /// The current label, the object's pictures and the pictures to try, numbered by index; removed ones keep their
 /// numbers. Also the versions of the model.
@@ -89,7 +92,7 @@ impl State {
     }
 
     /// Adds a picture, or restores it if it was removed, and returns its number. Marks that it has already are kept:
-    /// the given ones are used only if there are none, and are not saved yet.
+    /// the given ones are used only if there are none, or if only the given ones have a grasp, and are not saved yet.
     ///
     /// # Errors
     /// The picture is a photo already, the file beside it contains no marks of it or belongs to another photo, or an
@@ -105,8 +108,11 @@ impl State {
             None => MarkedPicture::of(picture, None)?.0,
         };
         image.check_file(self.photos())?;
-        if image.marks.has_object() {
-            image.note.get_or_insert("This picture was marked before; these marks are kept.".to_owned());
+        if image.marks.has_object() && (image.marks.grasp.is_some() || marks.grasp.is_none()) {
+            let note = image.note.get_or_insert_default();
+            if !note.starts_with(MARKS_KEPT) {
+                *note = format!("{MARKS_KEPT} {note}").trim_end().to_owned();
+            }
         } else {
             (image.marks, image.saved) = (marks, Saved::Nothing);
         }
@@ -210,7 +216,7 @@ impl State {
             removed: self.removed_earlier.clone(),
             models: self.models.versions.clone(),
             current_model: self.models.current,
-            searched: Some(self.region.map_or(Searched::All, Searched::Part)),
+            searched: Some(Searched::of(self.region)),
             ..ProjectFile::default()
         };
         for id in self.trial_ids() {

@@ -9,7 +9,7 @@ use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, TeacherError};
-use crate::region::Region;
+use crate::region::{Region, Searched};
 
 /// Maximum number of steps of a teaching run.
 const MAX_STEPS: usize = 1_000_000;
@@ -45,11 +45,17 @@ pub trait GraspTeacher: Send + Sync + 'static {
     /// The part does not fit into the region, or the region exceeds the camera's pictures.
     fn check_region(&self, region: &Region, demonstrations: &[Demonstration]) -> Result<(), TeacherError>;
 
-    /// Reads a model that was taught before, with its summary.
+    /// Reads a model that was taught before, with its summary. If `searched` is given, it replaces the region in the
+    /// model's file, which is then not checked.
     ///
     /// # Errors
-    /// The bytes are not a model file.
-    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError>;
+    /// The bytes are not a model file, or the model cannot search the region.
+    fn open(
+        &self,
+        bytes: &[u8],
+        summary: &TaughtSummary,
+        searched: Option<Searched>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError>;
 }
 
 /// The inputs of a teaching run.

@@ -146,11 +146,15 @@ fn with_a_calibrated_camera_pictures_have_the_sensor_s_pixels_and_rotated_photos
     // Marked in the folder, such a photo is refused for its orientation and not for the size that its marks name.
     let folder = folder_of(&[]);
     std::fs::write(folder.path().join("turned.png"), turned_png(6)).unwrap();
-    std::fs::write(folder.path().join("turned.json"), LABELME).unwrap();
-    let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
-    let options = SessionOptions { project, pixel_frame, ..SessionOptions::default() };
-    let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
-    assert!(refused.contains("Exif"), "{refused}");
+    let upright =
+        LABELME.replace(r#""imageWidth": 200, "imageHeight": 100"#, r#""imageWidth": 100, "imageHeight": 200"#);
+    for marks in [LABELME, &upright] {
+        std::fs::write(folder.path().join("turned.json"), marks).unwrap();
+        let (project, pixel_frame) = (Some(folder.path().to_owned()), PixelFrame::Sensor);
+        let options = SessionOptions { project, pixel_frame, ..SessionOptions::default() };
+        let refused = Session::open(&options, Arc::new(InPlace)).err().expect("an error").to_string();
+        assert!(refused.contains("Exif"), "{refused}");
+    }
 }
 
 #[test]
@@ -243,6 +247,42 @@ fn a_tried_picture_that_has_marks_keeps_them() {
     served.ask("DELETE", "/api/images/1", b"").json();
     let later = accept(&Served::of_photo(served.end(), "rod.png"));
     assert_eq!(later["marks"], again["marks"]);
+}
+
+#[test]
+fn a_tried_picture_keeps_its_grasp_but_a_box_alone_gives_way_to_what_was_found() {
+    let folder = folder_of(&["rod.png", "other.png"]);
+    std::fs::write(folder.path().join("other.json"), LABELME).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    served.ask("POST", "/api/others/0/try", b"").json();
+    let accept = |marks: &str| served.ask("POST", "/api/trial-pictures/0/accept", marks.as_bytes()).json();
+    let first = accept(MARKS);
+    assert_eq!(first["marks"]["grasp"]["jaw_width"], 24.0);
+    assert_eq!(first["saved"], json!({"state": "written", "file": "other.coco.json"}));
+    assert_eq!(std::fs::read_to_string(served.folder.path().join("other.json")).unwrap(), LABELME);
+    served.ask("DELETE", "/api/images/1", b"").json();
+    // The page compares the marks with those that it sent, and shows the note.
+    let again = accept(&MARKS.replace("[80, 50]", "[70, 50]"));
+    assert_eq!(again["marks"], first["marks"]);
+    let note = again["note"].as_str().unwrap();
+    assert!(note.contains("these marks are kept. other.json is kept unchanged"), "{note}");
+}
+
+#[test]
+fn an_uploaded_picture_that_is_accepted_again_is_the_same_photo() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    let accept = || served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    assert_eq!(accept()["id"], 1);
+    let corrected = MARKS.replace("[80, 50]", "[70, 50]");
+    served.ask("PUT", "/api/images/1/marks", corrected.as_bytes()).json();
+    served.ask("DELETE", "/api/images/1", b"").json();
+    let again = accept();
+    assert_eq!((&again["id"], &again["marks"]["grasp"]["start"]), (&json!(1), &json!([70.0, 50.0])));
+    assert_eq!(names(&session(&served)["images"]), ["rod.png", "found.png"]);
+    let files = std::fs::read_dir(served.folder.path()).unwrap();
+    let pictures = files.filter(|file| file.as_ref().unwrap().path().extension() == Some("png".as_ref()));
+    assert_eq!(pictures.count(), 2, "the photo and one copy");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::served;
+use image::{Rgb, RgbImage};
 use sdg_demonstration::{Annotation, ImageFacts};
 use sdg_geometry::Polygon;
 use serde_json::{Value, json};
@@ -96,6 +97,19 @@ fn samples_are_pictures_that_change_with_number_and_marks() {
     assert_eq!(first, sample("/api/images/0/samples/0?seed=1"));
     assert_ne!(first, sample("/api/images/0/samples/1?seed=1"));
     assert_ne!(first, sample("/api/images/0/samples/0?seed=2"));
+}
+
+#[test]
+fn a_very_long_photo_has_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = RgbImage::from_fn(9000, 64, |x, y| Rgb([(x % 251) as u8, (3 * y) as u8, 90]));
+    photo.save(folder.path().join("long.png")).unwrap();
+    let served = Served::of_photo(folder, "long.png");
+    let grasp = json!({"start": [4030, 30], "end": [4070, 30], "jaw_width": 44});
+    put_marks(&served, &json!({"box": [4000, 10, 4100, 50], "grasp": grasp}));
+    let answer = served.ask("GET", "/api/images/0/samples/0?seed=1", b"");
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert_eq!(image::load_from_memory(&answer.body).unwrap().into_rgb8().dimensions(), (400, 16));
 }
 
 #[test]

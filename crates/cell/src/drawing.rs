@@ -50,9 +50,10 @@ pub fn draw_detections<'a>(
 
 /// Draws the visible parts of a frame, the best on top, with their scores and their track numbers, counted from 1.
 pub fn draw_parts(drawn: &mut RgbImage, parts: &[Part], min_score: f64) {
-    let seen = parts.iter().filter(|part| part.is_seen(min_score));
-    let marked: Vec<_> =
-        seen.map(|part| (&part.found.detection, true, part.track.map(|(number, ..)| number + 1))).collect();
+    let mut seen: Vec<&Part> = parts.iter().filter(|part| part.is_seen(min_score)).collect();
+    seen.sort_by(|one, other| one.by_score(other));
+    let marked = seen.into_iter().map(|part| (&part.found.detection, true, part.track.map(|(number, ..)| number + 1)));
+    let marked: Vec<_> = marked.collect();
     draw_marked(drawn, &marked);
 }
 

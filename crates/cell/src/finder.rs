@@ -165,8 +165,8 @@ impl<P> ModelFinder<P> {
         Self { heights_m: Some(heights_m), ..self }
     }
 
-    /// The last picture for a grasp and its detections, best first; not one of [`PartFinder::find_nearest`], which
-    /// shows a part that was put down.
+    /// The last picture for a grasp and its detections, best first; not one of [`PartFinder::find_nearest`], which may
+    /// show a part that was put down.
     pub fn last(&self) -> Option<(&RgbImage, &[Found])> {
         self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
@@ -208,12 +208,14 @@ impl<P> ModelFinder<P> {
     {
         let heights_m = self.heights_m.clone();
         let found = self.find_all(arm, higher_m, heights_m.as_ref())?;
-        let is_placed = |target: &GraspTarget| {
-            let p = target.base_from_tcp.translation;
-            self.places.iter().any(|place| place.covers([p.x, p.y]))
-        };
-        let best = found.iter().position(|(target, _)| !is_placed(target));
+        let best = found.iter().position(|(target, _)| !self.is_placed(&target.base_from_tcp));
         Ok(self.choose(found, best))
+    }
+
+    /// Whether a part with this grasp lies in one of the places.
+    fn is_placed(&self, base_from_tcp: &Isometry3<f64>) -> bool {
+        let p = base_from_tcp.translation;
+        self.places.iter().any(|place| place.covers([p.x, p.y]))
     }
 
     /// Keeps the outline of the chosen part, and the other accepted parts. Returns the chosen one.
@@ -424,7 +426,10 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let found = self.find_all(arm, higher_m, heights_m.as_ref());
         self.last = last;
         let found = found?;
-        let sure = found.iter().enumerate().filter(|(_, (target, _))| target.score >= sdg_robot::SURE);
+        // Only a part that was put down is searched in a place; before a grasp, parts in places are not the target.
+        let is_allowed = |target: &GraspTarget| self.is_placed(base_from_tcp) || !self.is_placed(&target.base_from_tcp);
+        let is_sure = |target: &GraspTarget| target.score >= sdg_robot::SURE && is_allowed(target);
+        let sure = found.iter().enumerate().filter(|(_, (target, _))| is_sure(target));
         let nearest = sure.min_by(|(_, (a, _)), (_, (b, _))| apart_m(a).total_cmp(&apart_m(b)));
         let nearest = nearest.map(|(idx, _)| idx);
         Ok(self.choose(found, nearest))

@@ -39,6 +39,18 @@ impl GraspTask {
         }
         object
     }
+
+    /// The record of a task whose motion was not permitted.
+    pub fn refused_record(&self, robot: &str, total_secs: f64) -> Value {
+        json!({
+            "robot": robot,
+            "model": self.model.kind().letter(),
+            "object": self.model.object(),
+            "moved": false,
+            "held": false,
+            "total_seconds": total_secs,
+        })
+    }
 }
 
 fn target_json(target: &GraspTarget) -> Value {

@@ -1,5 +1,6 @@
 //! Detection in a camera's frames: in each frame independently, or with tracking across frames.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
@@ -79,6 +80,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// The order of parts in outputs: decreasing scores, as of the detections in a picture.
+    pub fn by_score(&self, other: &Self) -> Ordering {
+        other.found.detection.score.total_cmp(&self.found.detection.score)
+    }
+
     /// Whether the part is visible in this frame.
     pub fn is_seen(&self, min_score: f64) -> bool {
         match self.track {
@@ -148,7 +154,7 @@ impl FrameDetector {
         Ok(Self { detector, verification, tracker, interval, clock: FrameClock::default() })
     }
 
-    /// The parts in a frame.
+    /// The parts in a frame: by decreasing score, or with tracking by the number of their tracks.
     ///
     /// # Errors
     /// The picture's size differs from the camera's, or detection fails.

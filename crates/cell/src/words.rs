@@ -7,8 +7,6 @@ use crate::perception::{Found, Perception};
 /// Minimum score for advice. Below it, the detection does not resemble the part, and advice would mislead. Chosen by
 /// hand.
 const MIN_ADVISED_SCORE: f64 = 0.03;
-/// Minimum relative difference from the nominal size that is given as a reason. Chosen by hand.
-const SIZE_TOLERANCE: f64 = 0.03;
 /// Maximum number of explained detections in a picture. More texts would overlap.
 const MAX_EXPLAINED: usize = 3;
 
@@ -38,6 +36,11 @@ fn resembles_the_part(detection: &GraspDetection) -> bool {
     detection.score >= MIN_ADVISED_SCORE
 }
 
+/// The value for display with this number of decimals: zero in place of small negative numbers, which would be "-0.0".
+pub fn without_minus_zero(value: f64, decimals: i32) -> f64 {
+    if value.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { value }
+}
+
 /// Inputs of the texts about the detections in a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct DetectionWords<'a> {
@@ -58,22 +61,23 @@ impl DetectionWords<'_> {
     /// Position, angle and width of the grasp in pixels, and also in millimetres if the camera is known.
     pub fn position(&self, found: &Found) -> String {
         let grasp = found.detection.grasp;
+        let tenths = |value: f64| without_minus_zero(value, 1);
         let metric = found.pose.zip(self.detector.frame()).map(|(pose, frame)| {
             let name = frame.name();
-            let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
+            let [x, y, z] = pose.position_m.coords.map(|length| tenths(1e3 * length)).into();
             format!(
                 " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
                 1e3 * pose.uncertainty.position_m,
-                pose.yaw.degrees(),
+                tenths(pose.yaw.degrees()),
                 pose.uncertainty.yaw_rad.to_degrees(),
                 1e3 * pose.opening_m
             )
         });
         format!(
             "({:.1}, {:.1}), {:.1}°, {:.1} px wide{}",
-            grasp.x,
-            grasp.y,
-            grasp.angle.degrees(),
+            tenths(grasp.x),
+            tenths(grasp.y),
+            tenths(grasp.angle.degrees()),
             grasp.width,
             metric.unwrap_or_default()
         )
@@ -104,18 +108,13 @@ impl DetectionWords<'_> {
     /// The strongest reasons for refusing a detection, in words, at most `most` of them.
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
-        let size =
-            self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SIZE_TOLERANCE);
-        let in_words = |kind: EvidenceKind| match (kind, size) {
-            (EvidenceKind::Size, Some(size)) => format!("its size is {size:.2} of the photo's"),
-            _ => kind.objection().to_owned(),
+        let config = &self.detector.model().demonstrations()[0].check().score;
+        let in_words = |kind: EvidenceKind| match kind {
+            // Without a known size, parts are compared with each other, and not with the photo.
+            EvidenceKind::Size if !config.is_size_known => "it has another size than the surest part in the picture",
+            _ => kind.objection(),
         };
-        let reasons: Vec<String> = evidence
-            .objections(&self.detector.model().demonstrations()[0].check().score)
-            .into_iter()
-            .take(most)
-            .map(in_words)
-            .collect();
+        let reasons: Vec<&str> = evidence.objections(config).into_iter().take(most).map(in_words).collect();
         if reasons.is_empty() { "all evidence together is too weak".to_owned() } else { reasons.join("; also ") }
     }
 
@@ -135,6 +134,28 @@ impl DetectionWords<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sdg_grasp::{GraspModel, TeachOptions, Verification};
+    use std::path::Path;
+
+    #[test]
+    fn an_unknown_size_is_compared_with_the_surest_part() {
+        let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
+        let bytes = std::fs::read(datasets.join("models/pendulum-shape-format-3.sdg")).unwrap();
+        let model = GraspModel::from_bytes(&bytes, &TeachOptions::new(0).device).unwrap();
+        let photo = image::open(datasets.join("demonstrations/pendulum/image.png")).unwrap().to_rgb8();
+        let detector = Perception::of_any_camera(model);
+        let mut found = detector.detect(&photo, Verification::ByShape).unwrap().swap_remove(0).detection;
+        // As beside a part of clearly another size.
+        found.evidence.as_mut().unwrap().size = -9.0;
+        let words = DetectionWords { detector: &detector, picture_size: photo.dimensions().into(), min_score: 0.5 };
+        assert_eq!(words.reasons(&found, 1), "it has another size than the surest part in the picture");
+    }
+
+    #[test]
+    fn no_zero_has_a_minus() {
+        let shown = |value: f64| format!("{:.1}", without_minus_zero(value, 1));
+        assert_eq!([-0.049, -0.051, 0.0, 12.34, -3.0].map(shown), ["0.0", "-0.1", "0.0", "12.3", "-3.0"]);
+    }
 
     #[test]
     fn advice_about_light_compares_the_picture_with_the_photo() {

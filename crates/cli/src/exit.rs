@@ -67,11 +67,10 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
     if error.is::<Usage>() { 2 } else { 1 }
 }
 
-/// Whether the reader of the output closed the pipe, as `head` does. This is not a failure.
+/// Whether the reader of the output closed the pipe, as `head` does. This is not a failure. The connection to an arm can
+/// end in the same way, but then the cause is in an error of another type.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.downcast_ref::<io::Error>().is_some_and(|io_error| io_error.kind() == io::ErrorKind::BrokenPipe)
-    })
+    error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }
 
 /// The error and its causes on one line, followed by the option that corrects it.
@@ -145,5 +144,18 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             Some(RobotError::NoRealTime { .. }) => Some("--no-realtime does without".to_owned()),
             _ => None,
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_closed_output_is_no_failure() {
+        let closed = || io::Error::from(io::ErrorKind::BrokenPipe);
+        assert!(is_closed_pipe(&closed().into()));
+        let of_another_stream = sdg_camera::CameraError::Port { port: 0, source: closed() };
+        assert!(!is_closed_pipe(&of_another_stream.into()));
     }
 }

@@ -1,4 +1,4 @@
-//! Results as JSON on standard output.
+//! Results on standard output, as JSON or in words.
 
 use std::io;
 
@@ -18,6 +18,15 @@ pub fn json_line<T: Serialize>(value: &T) -> serde_json::Result<String> {
     let mut line = Vec::new();
     value.serialize(&mut serde_json::Serializer::with_formatter(&mut line, Rounded))?;
     Ok(String::from_utf8_lossy(&line).into_owned())
+}
+
+/// Prints a line of a result in words: on standard output, or on standard error if standard output has JSON.
+pub fn tell(is_json: bool, line: &str) {
+    if is_json {
+        eprintln!("{line}");
+    } else {
+        println!("{line}");
+    }
 }
 
 struct Rounded;

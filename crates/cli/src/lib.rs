@@ -21,6 +21,10 @@
 #![allow(missing_docs, reason = "the library of a program: nothing but this workspace uses it")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+// First, so that its macros replace those of std in all other modules.
+#[macro_use]
+mod output;
+
 #[doc(hidden)]
 pub mod args;
 mod clock;
@@ -32,6 +36,7 @@ mod found_text;
 mod interrupt;
 mod json_line;
 mod live_pictures;
+mod output_paths;
 mod paint;
 #[cfg(feature = "simulation")]
 mod parts;
@@ -116,7 +121,7 @@ pub fn run(args: &Args) -> u8 {
         Command::Man(man) => commands::man::run(man, command()),
         Command::Devices(devices) => commands::devices::run(devices),
     };
-    match done {
+    match done.and_then(|outcome| output::finish().map(|()| outcome)) {
         Ok(outcome) => {
             if prints_total_time(&args.command) {
                 eprintln!("took {:.1} s from start to exit", clock::elapsed_secs());

@@ -87,8 +87,11 @@ impl From<EncodingName> for Encoding {
 
 impl LiveArgs {
     /// The settings in the form of the camera crate.
-    pub(crate) fn options(&self) -> OpenOptions {
-        self.request.options()
+    ///
+    /// # Errors
+    /// The errors of [`RequestArgs::options`].
+    pub(crate) fn options(&self) -> Result<OpenOptions, Usage> {
+        self.request.options(&self.from)
     }
 }
 
@@ -99,25 +102,60 @@ impl RequestArgs {
     /// # Errors
     /// [`Usage`] with the names of the given options.
     pub(crate) fn refuse_without_camera(&self, own: &[(&'static str, bool)], found: &str) -> Result<(), Usage> {
-        let asked = [
-            ("--size", self.size.is_some()),
-            ("--fps", self.fps.is_some()),
-            ("--encoding", self.encoding.is_some()),
-            ("--exposure-ms", self.exposure_ms.is_some()),
-            ("--white-balance-kelvin", self.white_balance_kelvin.is_some()),
-            ("--stall-secs", self.stall_secs.is_some()),
-        ];
-        let given: Vec<_> = own.iter().chain(&asked).filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+        let of_any_camera = [("--stall-secs", self.stall_secs.is_some())];
+        let settings = self.settings();
+        let given = own.iter().chain(&settings).chain(&of_any_camera).filter(|(_, is_given)| *is_given);
+        let given: Vec<_> = given.map(|(name, _)| *name).collect();
         if given.is_empty() {
             return Ok(());
         }
         Err(Usage(format!("{}: expected live pictures (--from ADDRESS), found {found}", given.join(", "))))
     }
 
+    /// The options that only some cameras have, and whether each is given.
+    fn settings(&self) -> [(&'static str, bool); 5] {
+        [
+            ("--size", self.size.is_some()),
+            ("--fps", self.fps.is_some()),
+            ("--encoding", self.encoding.is_some()),
+            ("--exposure-ms", self.exposure_ms.is_some()),
+            ("--white-balance-kelvin", self.white_balance_kelvin.is_some()),
+        ]
+    }
+
+    /// Rejects `--size` if pictures have another size; `whose` says what their size is that of.
+    ///
+    /// # Errors
+    /// [`Usage`] with both sizes.
+    pub(crate) fn check_size(&self, [width, height]: [u32; 2], whose: &str) -> Result<(), Usage> {
+        match self.size.filter(|&asked| asked != (width, height)) {
+            Some((asked_width, asked_height)) => Err(Usage(format!(
+                "--size: expected {width}x{height}, the size {whose}, found {asked_width}x{asked_height}"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     /// The settings in the form of the crate that opens the camera.
-    pub(crate) fn options(&self) -> OpenOptions {
+    ///
+    /// # Errors
+    /// [`Usage`] if a setting is given that the camera at this address does not have.
+    pub(crate) fn options(&self, address: &Address) -> Result<OpenOptions, Usage> {
+        let has = |setting: &str| match address {
+            Address::V4l(_) => true,
+            Address::Http(_) => setting == "--fps",
+            _ => false,
+        };
+        let missing = self.settings().into_iter().filter(|&(setting, is_given)| is_given && !has(setting));
+        let missing: Vec<_> = missing.map(|(setting, _)| setting).collect();
+        if !missing.is_empty() {
+            let missing = missing.join(", ");
+            return Err(Usage(format!(
+                "{missing}: expected a V4L2 camera (v4l:), or http: for --fps, found {address}"
+            )));
+        }
         let (width, height) = self.size.unwrap_or(DEFAULT_SIZE);
-        OpenOptions {
+        Ok(OpenOptions {
             width,
             height,
             fps: self.fps,
@@ -126,7 +164,7 @@ impl RequestArgs {
             white_balance_kelvin: self.white_balance_kelvin,
             stall_timeout: Duration::from_secs_f64(self.stall_secs.unwrap_or(DEFAULT_STALL_SECS)),
             ..OpenOptions::default()
-        }
+        })
     }
 }
 

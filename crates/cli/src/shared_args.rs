@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
-use sdg_grasp::{ComputeBackend, SearchRegion};
+use sdg_grasp::{ComputeBackend, GraspModel, SearchRegion, Verification};
+use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_robot::height::GivenHeight;
 
 /// Device for the network.
@@ -157,6 +158,18 @@ pub fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The verification of a command with `--no-verify`, which has no effect on a model without a network.
+pub fn verification(no_verify: bool, model: &GraspModel) -> Verification {
+    if !no_verify {
+        return Verification::ByShape;
+    }
+    if !model.kind().has_network() {
+        eprintln!("--no-verify: expected a model with a network, found model {}: its parts are checked", model.kind());
+        return Verification::ByShape;
+    }
+    Verification::Off
+}
+
 /// Parses a positive, finite number.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -188,16 +201,34 @@ fn size_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a size", [1.0, 5000.0])
 }
 
-/// Parses a length from `min` to `max`. The length must also be zero or at least 0.1 mm, because a smaller positive
-/// number was probably given in metres.
+/// Parses the distance between the fingers.
+pub fn opening_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
+}
+
+/// Parses the z of a table in the robot's base, which may be negative. The camera's height above it is checked later.
+pub fn table_height_mm(text: &str) -> Result<f64, String> {
+    let hint = match text.parse::<f64>() {
+        Ok(height) if height == 0.0 || (height.is_finite() && height.abs() >= MIN_MM) => return Ok(height),
+        Ok(height) if height.is_finite() => METRES,
+        _ => "",
+    };
+    Err(format!("expected the table's z in millimetres, found {text}{hint}"))
+}
+
+/// Minimum absolute value of a length other than 0: a smaller one was probably given in metres.
+const MIN_MM: f64 = 0.1;
+/// Ends the errors of such lengths.
+pub const METRES: &str = ": metres given as millimetres?";
+
+/// Parses a length from `min` to `max`. The length must also be zero or at least [`MIN_MM`].
 pub fn millimetres(text: &str, name: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
-    const MIN_MM: f64 = 0.1;
     let number = text.parse().unwrap_or(f64::NAN);
     let is_tiny = 0.0 < number && number < MIN_MM.max(min);
     if (min..=max).contains(&number) && !is_tiny {
         return Ok(number);
     }
-    let hint = if is_tiny { ": metres given as millimetres?" } else { "" };
+    let hint = if is_tiny { METRES } else { "" };
     Err(format!("expected {name} of {min} to {max} millimetres, found {text}{hint}"))
 }
 
@@ -208,7 +239,9 @@ mod tests {
     #[test]
     fn metres_are_no_millimetres() {
         assert_eq!((height_mm("0"), height_mm("0.4"), height_mm("16")), (Ok(0.0), Ok(0.4), Ok(16.0)));
-        let found = [height_mm("0.016"), size_mm("0.12")].map(Result::unwrap_err);
+        assert_eq!(["0", "-0.4", "-12.5"].map(table_height_mm), [Ok(0.0), Ok(-0.4), Ok(-12.5)]);
+        let found = [height_mm("0.016"), size_mm("0.12"), opening_mm("0.04"), table_height_mm("-0.0125")];
+        let found = found.map(Result::unwrap_err);
         assert!(found.iter().all(|error| error.ends_with("metres given as millimetres?")), "{found:?}");
         for text in ["-1", "501", "nan", "4 cm"] {
             assert!(height_mm(text).unwrap_err().ends_with(&format!("millimetres, found {text}")), "{text}");

@@ -50,6 +50,34 @@ fn coco_to_labelme_and_back_is_the_same_file() {
 }
 
 #[test]
+fn the_flag_optional_comes_back_or_is_left_out_aloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let [labelme, coco, again, yolo] = ["a.json", "b.json", "c.json", "d.txt"].map(|name| folder.path().join(name));
+    fs::write(
+        &labelme,
+        r#"{"imagePath": "a.png", "imageWidth": 640, "imageHeight": 480, "shapes": [
+            {"label": "rod", "shape_type": "rectangle", "points": [[10, 10], [90, 60]], "group_id": 1},
+            {"label": "rod", "shape_type": "rectangle", "points": [[110, 10], [190, 60]], "group_id": 2,
+             "flags": {"optional": true}}]}"#,
+    )
+    .unwrap();
+    let read = |path: &Path| -> Value { serde_json::from_slice(&fs::read(path).unwrap()).unwrap() };
+    assert_eq!(converted(&labelme, &coco, &[])["left_out"], serde_json::json!([]));
+    let annotations = &read(&coco)["annotations"];
+    assert_eq!(annotations[1]["attributes"]["optional"], true);
+    assert_ne!(annotations[0]["attributes"]["optional"], true);
+    converted(&coco, &again, &["--format", "labelme"]);
+    let shapes = &read(&again)["shapes"];
+    assert_eq!(
+        [&shapes[0]["flags"], &shapes[1]["flags"]],
+        [&serde_json::json!({}), &serde_json::json!({"optional": true})]
+    );
+    let left_out = &converted(&again, &yolo, &[])["left_out"];
+    assert_eq!(left_out.as_array().unwrap().len(), 1);
+    assert!(left_out[0].as_str().unwrap().contains("the flag `optional` of `rod`"), "{left_out}");
+}
+
+#[test]
 fn yolo_pose_says_what_it_has_no_room_for() {
     let folder = tempfile::tempdir().unwrap();
     let (labels, back) = (folder.path().join("image.txt"), folder.path().join("back.json"));
@@ -191,10 +219,10 @@ fn every_format_is_a_demonstration() {
         (shipped("fuel_line", "image.png"), foreign("yolo-pose.txt")),
         (numbered, foreign("boxes_train.npy")),
     ] {
-        let out = folder.path().join("samples");
+        let out = tempfile::tempdir_in(folder.path()).unwrap();
         let demonstration = format!("{}:{}", image.display(), annotation.display());
         let done = Command::new(env!("CARGO_BIN_EXE_sdg"))
-            .args(["augment", "--count", "1", "--demo", &demonstration, "--out", out.to_str().unwrap()])
+            .args(["augment", "--count", "1", "--demo", &demonstration, "--out", out.path().to_str().unwrap()])
             .output()
             .unwrap();
         assert!(done.status.success(), "{demonstration}: {}", String::from_utf8_lossy(&done.stderr));

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sdg_evaluation::{Settings, Store};
 
-use crate::support::{Folder, sdg, shipped, taught_pendulum};
+use crate::support::{Folder, sdg, shipped, taught_pendulum, write_unusable_demonstration};
 
 /// Asserts the exit code, and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
@@ -106,6 +106,15 @@ fn the_demonstration_is_no_picture_without_the_part() {
     let teach = ["teach", "--model", "S", "--demo", &demo, "--negative", &copy, "--out", &out];
     assert_refused(&teach, 2, &["--negative: expected a picture without the part", "copy.png"]);
     assert!(!fs::exists(&out).unwrap());
+    // With other pixels it is not recognised as the demonstration, but it still shows the part.
+    let mut changed = image::open(&photo).unwrap().into_rgb8();
+    changed.put_pixel(0, 0, image::Rgb([0, 0, 0]));
+    changed.save(&copy).unwrap();
+    let taught = sdg(&teach);
+    let [stdout, stderr] = [taught.stdout, taught.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(stdout.contains("refuses 0 of 1 pictures without the part\n"), "{stdout}");
+    let warning = format!("--negative {copy}: still accepted with ");
+    assert!(stderr.contains(&warning) && stderr.contains("does it show the part?"), "{stderr}");
 }
 
 #[test]
@@ -150,6 +159,11 @@ fn the_annotation_page_does_not_open_on_what_cannot_be_marked() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     assert_refused(&["annotate", "--no-browser", "--port", &port, photo], 1, &["127.0.0.1", &port]);
+    let (new, camera) = (folder.path().join("new.png"), shipped("../workcell", "camera.yaml"));
+    let from = ["annotate", new.to_str().unwrap(), "--from", "sim:pendulum", "--size", "320x240"];
+    let calibrated = ["--camera", camera.to_str().unwrap(), "--mark-height-mm", "16"];
+    let size = "--size: expected 640x480, the size of the calibration, found 320x240";
+    assert_refused(&[&from[..], &calibrated].concat(), 2, &[size]);
     fs::write(folder.path().join("photo.json"), "{\"shapes\": [}").unwrap();
     assert_refused(&["annotate", photo], 1, &["photo.json", "not JSON"]);
 }
@@ -241,6 +255,9 @@ fn augment_writes_pictures_and_their_list() {
     let out = folder.path().join("samples");
     let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let run = |seed: &str| {
+        if out.exists() {
+            fs::remove_dir_all(&out).unwrap();
+        }
         let output = sdg(&[
             "augment",
             "--demo",
@@ -283,16 +300,8 @@ fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
 #[test]
 fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
     let folder = Folder::new();
-    // A patch of a checkerboard, which occurs everywhere in the picture.
     let photo = folder.path("checks.png");
-    let checks =
-        image::GrayImage::from_fn(640, 480, |x, y| image::Luma([if (x / 40 + y / 40) % 2 == 0 { 200 } else { 60 }]));
-    checks.save(&photo).unwrap();
-    let marks = serde_json::json!({
-        "images": [{"id": 1, "file_name": "checks.png"}],
-        "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "bbox": [240, 160, 160, 160], "keypoints": [300, 240, 2, 340, 240, 2]}],
-        "categories": [{"id": 1, "name": "patch", "keypoints": ["grasp_start", "grasp_end"]}]});
-    folder.text("checks.json", &marks.to_string());
+    write_unusable_demonstration(Path::new(&photo));
     let model = folder.path("model.sdg");
     let taught = sdg(&["teach", "--model", "S", "--demo", &photo, "--out", &model, "--json"]);
     let said = String::from_utf8(taught.stderr).unwrap();

@@ -123,6 +123,8 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     let files = Folder::new();
     let (svg, pdf) = (files.path("board.svg"), files.path("board.pdf"));
     stdout(&["camera", "board", "--out", &svg, "--pdf", &pdf]);
+    assert_refused(&["camera", "board", "--out", &pdf], 2, &["--out: expected a file that ends in .svg"]);
+    assert_refused(&["camera", "board", "--pdf", &svg], 2, &["--pdf: expected a file that ends in .pdf"]);
     assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF-1.7"));
     let sheet = printed(&fs::read_to_string(&svg).unwrap());
 
@@ -432,6 +434,10 @@ fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
     assert_eq!(fs::read_to_string(&rational).unwrap(), eight);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400"], 2, &["X,Y"]);
     table(&[a, "--camera", &known, "--sheet-in-base-mm", "400000,0"], 2, &["5000 mm"]);
+    table(&[a, "--camera", &known, "--sheet-in-base-mm", "0.4,-0.05"], 2, &["0.4,-0.05: metres given as millimetres?"]);
+    let based = [a, "--camera", &known, "--sheet-in-base-mm", "400,-50"];
+    table(&[&based[..], &["--sheet-yaw-deg", "720"]].concat(), 2, &["--sheet-yaw-deg: expected -360 to 360 degrees"]);
+    table(&[&based[..], &["--table-height-mm", "-0.0125"]].concat(), 2, &["metres given as millimetres?"]);
     let nonsense = files.text("nonsense.yaml", &fs::read_to_string(&known).unwrap().replace("450.0", "-450.0"));
     table(&[a, "--camera", &nonsense], 1, &["nonsense.yaml", "positive focal length"]);
     let steep =

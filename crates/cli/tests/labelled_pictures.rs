@@ -188,7 +188,9 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     fs::copy(shipped("pendulum", "annotation.json"), labelme.join("photo.json")).unwrap();
     fs::write(labelme.join("poses.json"), "[1, 2]").unwrap();
     fs::copy(samples.join("000000.png"), labelme.join("unlabelled.png")).unwrap();
-    let again = evaluate(&labelme, &model, &report, &["--min-score", "0.5"]);
+    // Model S has no network that could decide alone.
+    let again = evaluate(&labelme, &model, &report, &["--min-score", "0.5", "--no-verify"]);
+    assert_eq!(again["verified"], true);
     assert_eq!(counts(&again), expected);
     assert_eq!(again["optional"], evaluated["optional"]);
     let left_out: Vec<&str> =
@@ -382,4 +384,18 @@ fn a_folder_or_a_model_alone_and_options_of_the_protocol_are_wrong_usage() {
     ] {
         assert_eq!(sdg(arguments).status.code(), Some(2), "{arguments:?}");
     }
+}
+
+#[test]
+fn labels_of_another_part_are_told_and_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, report) = (teach(folder.path()), folder.path().join("report"));
+    let case = Case::new("a.json", &labelme(&instance("bolt", 1, 100.0)));
+    let pictures = case.folder.path();
+    let evaluated =
+        sdg(&["evaluate", "--pictures", text(pictures), "--grasp-model", text(&model), "--report", text(&report)]);
+    let stderr = String::from_utf8(evaluated.stderr).unwrap();
+    assert!(stderr.contains("all labels are `bolt`, the model's part is `pendulum`"), "{stderr}");
+    let told = evaluate(pictures, &model, &report, &["--label", "pendulum"]);
+    assert_eq!((&told["pictures_without_part"], &told["other_labels"]), (&json!(1), &json!(1)));
 }

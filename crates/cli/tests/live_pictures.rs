@@ -143,7 +143,9 @@ fn frames_of_a_calibrated_camera_have_its_stored_pixels_and_its_size() {
     let level_of = |further: &[&str]| {
         let output = grab(further);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        level(Path::new(&out))
+        let found = level(Path::new(&out));
+        fs::remove_file(&out).unwrap();
+        found
     };
     let wrist = files.text("wrist.yaml", WRIST_CAMERA);
     assert!(level_of(&[]).abs_diff(200) < 10 && level_of(&["--camera", &wrist]).abs_diff(50) < 10);
@@ -163,6 +165,17 @@ fn watch_tells_rate_brightness_and_faults() {
     let fps = told[0]["fps"].as_f64().unwrap();
     assert!(fps > 5.0 && fps < 52.0, "{fps}");
     assert!(told[0]["faults"].as_array().unwrap().is_empty(), "files may repeat: {}", told[0]);
+
+    // Without a frame there is no size.
+    let empty = tempfile::tempdir().unwrap();
+    let address = format!("dir:{}?follow", empty.path().display());
+    let silent = ["camera", "watch", "--from", &address, "--stall-secs", "0.1", "--seconds", "0.5", "--json"];
+    let output = sdg(&silent);
+    let told = lines(&output);
+    assert_eq!((output.status.code(), &told[0]["frames"]), (Some(3), &0.into()));
+    for field in ["width", "height", "brightness"] {
+        assert_eq!(told[0][field], Value::Null, "{}", told[0]);
+    }
 
     // A live camera that repeats the same picture, and black pictures.
     let watch = |line: &str| {
@@ -198,7 +211,14 @@ fn cameras_that_are_none_are_refused() {
     assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);
     assert_refused(&grab(&file, &["--stall-secs=-1"]), 2, &["positive number of seconds"]);
     assert_refused(&grab(&file, &["--stall-secs", "1e30"]), 2, &["--stall-secs", "0.01 to 3600 seconds"]);
-    assert_refused(&grab(&file, &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
+    assert_refused(&grab("http://127.0.0.1:1/", &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
+    // Settings that the camera does not have.
+    let of_v4l = ["--size", "640x480", "--encoding", "yuyv", "--exposure-ms", "8", "--white-balance-kelvin", "4600"];
+    let told = "--size, --encoding, --exposure-ms, --white-balance-kelvin: expected a V4L2 camera (v4l:)";
+    for address in [file.as_str(), "cmd:true", "http://127.0.0.1:1/", "sim:pendulum"] {
+        assert_refused(&grab(address, &of_v4l), 2, &[told, &format!("found {address}")]);
+    }
+    assert_refused(&grab(&file, &["--fps", "10"]), 2, &["--fps: expected", "found file:"]);
     assert_refused(&grab(&file, &["--every=-1"]), 2, &["0 to 86400"]);
     assert!(!out.exists(), "a failed call writes nothing");
     let jpeg = sdg(&["camera", "grab", "--from", &file, "--out", "frame.jpg"]);

@@ -35,6 +35,8 @@ mod shared_units;
 mod shell;
 mod simulated_arm;
 mod split;
+#[cfg(target_os = "linux")]
+mod streams;
 mod support;
 mod variants;
 mod walk;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Folder, sdg, shipped, stdout};
+use crate::support::{Folder, sdg, shipped, stdout, write_unusable_demonstration};
 use serde_json::Value;
 
 /// Two parts, one of them under two names, and a photo without marks.
@@ -58,6 +58,8 @@ fn parts_that_look_alike_are_told() {
     fs::remove_file(&rod_end).unwrap();
     let text = stdout(&["teach", "--model", "S", "--demos", &demos, "--out", &out]);
     assert!(text.contains("look alike: lever and twin"), "{text}");
+    let unmarked = format!("left out: {}: expected", Path::new(&demos).join("unmarked.png").display());
+    assert!(text.contains(&unmarked) && !text.contains("needs another photo"), "{text}");
     assert!(rod_end.exists());
     assert!(teach(&["--part", "twin", "--seed", "2"]).status.success());
     assert_ne!(record("twin"), twin);
@@ -87,8 +89,24 @@ fn models_remain_if_the_base_weights_are_missing_or_the_marks_are_damaged() {
     let output = sdg(&[&["teach", "--model", "S"][..], &arguments].concat());
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("expected a part that can be taught"), "{error}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("not taught: lever: ") && !text.contains("needs another photo"), "{text}");
     assert!(!model.exists() && Path::new(&out).join("index.html").exists());
     assert_eq!(fs::read(model.with_extension("sdg.before")).unwrap(), before);
+}
+
+#[test]
+fn a_model_that_fails_its_own_samples_ends_with_4() {
+    let folder = Folder::new();
+    let (demos, out) = (folder.path("demos"), folder.path("out"));
+    fs::create_dir(&demos).unwrap();
+    write_unusable_demonstration(&Path::new(&demos).join("checks.png"));
+    for more in [&["--part", "checks"][..], &[]] {
+        let output = sdg(&[&["teach", "--model", "S", "--demos", &demos, "--out", &out][..], more].concat());
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(4), "{more:?}: {error}");
+        assert!(Path::new(&out).join("models/checks.sdg").exists());
+    }
 }
 
 #[test]

@@ -64,20 +64,28 @@ fn drawings_replace_no_picture() {
 fn frames_and_samples_replace_no_picture() {
     let (folder, photo, marks) = photographed();
     let from = format!("file:{photo}");
-    refused(&["camera", "grab", "--from", &from, "--out", &photo], "found an input of this command", &[&photo]);
+    let other = folder.path("other.png");
+    fs::copy(&photo, &other).unwrap();
+    for out in [&photo, &other] {
+        refused(&["camera", "grab", "--from", &from, "--out", out], "--out: expected a new name", &[&photo, &other]);
+    }
     let pictures = folder.path("pictures");
     fs::create_dir(&pictures).unwrap();
     let first = folder.path("pictures/000000.png");
     fs::copy(&photo, &first).unwrap();
     let from = format!("dir:{pictures}");
     let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &pictures];
-    refused(&grab, "found an input of this command", &[&first]);
-    // The error is reported before the first sample is written.
+    refused(&grab, "--out: expected a new or an empty folder", &[&first]);
+    let empty = folder.path("empty");
+    fs::create_dir(&empty).unwrap();
+    let from = format!("dir:{empty}?follow");
+    let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &empty];
+    refused(&grab, "--out: expected another folder than that of --from", &[]);
     let list = folder.path("pictures/annotations.json");
     fs::copy(&marks, &list).unwrap();
     let demo = format!("{photo}:{list}");
     let augment = ["augment", "--demo", &demo, "--count", "2", "--out", &pictures];
-    refused(&augment, "found an input of this command", &[&first, &list]);
+    refused(&augment, "--out: expected a new or an empty folder", &[&first, &list]);
 }
 
 #[test]

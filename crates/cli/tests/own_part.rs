@@ -70,4 +70,6 @@ fn another_height_than_the_model_s_is_refused() {
     refused(&folder, &model, &["--height-mm", "20"], 2, &["whose marks are 16.0 mm above the table"]);
     // The same height is accepted: the next error is that of the mass.
     refused(&folder, &model, &["--height-mm", "16", "--mass-g", "0.01"], 1, &["mass in kg"]);
+    // Kilograms, given as grams.
+    refused(&folder, &model, &["--height-mm", "16", "--mass-g", "0.17"], 1, &["density in kg/m³: expected 10"]);
 }

@@ -78,8 +78,8 @@ fn the_simulated_arm_puts_the_part_down_behind_a_wall_and_looks_where_it_lies() 
     ];
     let out = folder.path("drawn");
     let dry = sdg(&[&call[..], &["--dry-run", "--out", &out]].concat());
-    let told = String::from_utf8(dry.stderr).unwrap();
-    assert!(dry.status.success() && told.contains("down softly to about "), "{told}");
+    let [plan, told] = [dry.stdout, dry.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert!(dry.status.success() && plan.contains("down softly to about "), "{plan} {told}");
     assert!(told.ends_with("nothing was moved\n"), "{told}");
 
     let done = sdg(&[&call[..], &["--json", "--out", &out]].concat());
@@ -131,7 +131,12 @@ fn places_and_cells_that_cannot_be_are_refused_by_name_and_line() {
     let cell = folder.path("cell.toml");
     grasp(&cell, &["--place", "table"], 2, &["--place: expected one of shelf, tray, found \"table\""]);
     grasp(&cell, &["--place", "tray"], 2, &["--place: expected tray:1 to tray:4, a cell of the tray"]);
-    grasp(&cell, &["--place", "tray:5"], 2, &["cell of \"tray\": expected 1 to 4, found 5"]);
+    grasp(
+        &cell,
+        &["--place", "tray:5"],
+        2,
+        &["--place: expected tray:1 to tray:4, a cell of the tray, found \"tray:5\""],
+    );
     let first_line = workcell_toml().lines().count() + 1;
     let at = |further: &str| {
         let line = further.lines().position(|line| line.contains("_mm = [")).unwrap();
@@ -173,7 +178,7 @@ fn a_workcell_is_drawn_from_above() {
     let cell = workcell(&folder, "cell.toml", PLACES);
     let out = folder.path("cell.png");
     let done = sdg(&["workcell", "show", &cell, "--grid-mm", "50", "--out", &out]);
-    let told = String::from_utf8(done.stderr).unwrap();
+    let told = String::from_utf8(done.stdout).unwrap();
     assert!(done.status.success(), "{told}");
     for part in ["\"shelf\" is reached", "\"tray\": all 4 cells are reached", "m² at every tested angle of the hand"] {
         assert!(told.contains(part), "expected \"{part}\" in: {told}");
@@ -188,4 +193,7 @@ fn a_workcell_is_drawn_from_above() {
     assert!(near([192, 178, 203]) > 2_000, "{}", near([192, 178, 203]));
     refused(&["workcell", "show", &cell, "--grid-mm", "1"], 2, &["--grid-mm: expected a number from 5 to 200"]);
     refused(&["workcell", "show", "/nowhere.toml"], 1, &["/nowhere.toml"]);
+    for out in ["cell.pdf", "-"] {
+        refused(&["workcell", "show", &cell, "--out", out], 2, &["--out: expected a file that ends in .png"]);
+    }
 }

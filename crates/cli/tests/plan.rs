@@ -77,6 +77,9 @@ fn what_blocks_is_named() {
             assert!(told.contains(part), "{call:?}: expected \"{part}\" in: {told}");
         }
     };
+    // A file in place of the folder of drawings is reported before the path is planned and printed.
+    let output = sdg(&["plan", "--workcell", &cell, "--goal", "500,-300,150", "--out", &cell]);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{output:?}");
     refused(&cell, &["500,0,200"], 1, &["the goal is not free", "inside wall"]);
     refused(&cell, &["1500,0,200"], 1, &["the goal: the pose is out of reach"]);
     refused(&cell, &["500,nan,200"], 2, &["expected finite numbers", "nan"]);

@@ -206,3 +206,19 @@ fn wrong_regions_are_one_clear_error_each() {
         assert!(!fs::exists(&out).unwrap());
     }
 }
+
+#[test]
+fn a_grasp_outside_the_picture_is_no_grasp() {
+    let folder = Folder::new();
+    let (model, cut) = (folder.path("model.sdg"), folder.path("cut.png"));
+    let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped("pliers", name));
+    let demo = format!("{}:{}", photo.display(), marks.display());
+    stdout(&["teach", "--model", "S", "--demo", &demo, "--out", &model]);
+    let photo = image::open(photo).unwrap();
+    // The grasp is at x = 320, and the handles reach to x = 413.
+    for (left, num_found) in [(306, 1), (326, 0)] {
+        photo.crop_imm(left, 0, 640 - left, 480).save(&cut).unwrap();
+        let found = lines(&["detect", "--grasp-model", &model, "--json", &cut]).remove(0);
+        assert_eq!(found["detections"].as_array().unwrap().len(), num_found, "{left}: {found}");
+    }
+}

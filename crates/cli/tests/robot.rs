@@ -53,12 +53,12 @@ fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
 
     let out = folder.path().join("drawn");
     let dry = sdg(&[&base[..], &from, &["--dry-run", "--out", text(&out)]].concat());
-    let stderr = String::from_utf8(dry.stderr).unwrap();
+    let [plan, stderr] = [dry.stdout, dry.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
     assert!(dry.status.success(), "{stderr}");
     // The grasp is 9 mm above the table, 7 mm below the marks; the run itself measures this height.
-    assert!(stderr.contains(", 9) mm in ") && stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
+    assert!(plan.contains(", 9) mm in ") && plan.contains("hand close on about 16 mm with 40 N"), "{plan}");
     let soft = sdg(&[&base[..], &from, &["--dry-run", "--soft", "--out", text(&out)]].concat());
-    let told = String::from_utf8(soft.stderr).unwrap();
+    let told = String::from_utf8(soft.stdout).unwrap();
     assert!(soft.status.success() && told.contains("down softly to about 9 mm, or until contact"), "{told}");
     assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
     assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
@@ -142,6 +142,10 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&workcell, &["--robot", "sim", "--from", "dir:/tmp"], 2, &["expected sim:PART"]);
     grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulum?speed=5"], 2, &["\"speed=5\""]);
     grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulums"], 2, &["--from: ", "pendulums"]);
+    let size = "--size: expected 640x480, the size of the calibration, found 320x240";
+    grasp(&workcell, &[&sim[..], &["--size", "320x240"]].concat(), 2, &[size]);
+    let exposure = ["--exposure-ms: expected a V4L2 camera", "found sim:pendulum"];
+    grasp(&workcell, &[&sim[..], &["--exposure-ms", "8"]].concat(), 2, &exposure);
     for speed in ["0", "0.7", "-1", "NaN"] {
         let speed = format!("--speed={speed}");
         grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a fraction", "at most 0.6"]);
@@ -211,11 +215,11 @@ fn an_arm_that_is_not_there_is_one_line() {
     }
     assert_refused(&["robot", "state"], 2, &["expected --robot ADDRESS"]);
     assert_refused(&["robot", "open", "--robot", "sim"], 2, &["expected the address of an arm"]);
-    assert_refused(
-        &["robot", "open", "--robot", "h", "--width-mm", "90"],
-        2,
-        &["--width-mm: expected 0 to 80, found 90"],
-    );
+    for (width, expected) in
+        [("90", "an opening of 0 to 80 millimetres, found 90"), ("0.04", "metres given as millimetres?")]
+    {
+        assert_refused(&["robot", "open", "--robot", "h", "--width-mm", width], 2, &["--width-mm", expected]);
+    }
     assert_refused(&["robot", "close", "--robot", "h", "--force-n", "0"], 2, &["--force-n: expected 1 to 70"]);
     assert_refused(&["robot", "home", "--robot", "h"], 2, &["expected --workcell FILE"]);
     assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);
@@ -329,6 +333,8 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     let asked = sdg(&grasp);
     let stderr = String::from_utf8(asked.stderr).unwrap();
     assert!(asked.status.success() && stderr.ends_with("nothing was moved\n"), "{stderr}");
+    let line: Value = serde_json::from_slice(&asked.stdout).unwrap();
+    assert_eq!((&line["moved"], &line["held"]), (&false.into(), &false.into()), "{line}");
 
     let done = sdg(&[&grasp[..], &["--yes"]].concat());
     let stderr = String::from_utf8(done.stderr).unwrap();

@@ -17,7 +17,7 @@ use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads the objects of one image of a COCO file; the image must have at least one.
-pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
     let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
         let id = choose_image(&root.field("images", "the list of images")?.items()?, image)?;
@@ -26,7 +26,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
             found: "none".into(),
         });
     }
-    Ok(instances.into_iter().map(|instance| instance.annotation).collect())
+    Ok(instances)
 }
 
 /// Maximum product of the numbers of an image's annotations and of categories, because all categories are searched for
@@ -226,8 +226,7 @@ impl CocoFile {
 
     /// Adds an image and its marks; ids count up from 1.
     pub fn push_image(&mut self, file_name: &str, width: u32, height: u32, objects: &[Annotation]) {
-        let instances: Vec<_> = objects.iter().map(|object| LabelledInstance::new(object.clone(), false)).collect();
-        self.push_labelled(file_name, width, height, &instances);
+        self.push_labelled(file_name, width, height, &LabelledInstance::not_optional(objects.to_vec()));
     }
 
     /// Adds a test picture and its instances, each optional or not; ids count up from 1.

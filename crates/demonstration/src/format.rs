@@ -5,7 +5,8 @@ use crate::json::{self, Node, describe};
 use crate::npy;
 use crate::other_kind::{other_json, other_kind};
 use crate::written::WrittenAnnotation;
-use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, foreign, labelme, opendr, yolo_pose};
+use crate::{Annotation, CocoFile, Error, ImageFacts, LabelledInstance, Result};
+use crate::{coco, foreign, labelme, opendr, yolo_pose};
 
 /// A kind of annotation file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,32 +105,41 @@ impl AnnotationFormat {
     /// # Errors
     /// [`Error::ReadOnlyFormat`] for OpenDR's.
     pub fn write(self, image: &ImageFacts, objects: &[Annotation]) -> Result<WrittenAnnotation> {
+        self.write_labelled(image, &LabelledInstance::not_optional(objects.to_vec()))
+    }
+
+    /// As [`write`](Self::write), with the flag `optional`.
+    ///
+    /// # Errors
+    /// [`Error::ReadOnlyFormat`] for OpenDR's.
+    pub fn write_labelled(self, image: &ImageFacts, instances: &[LabelledInstance]) -> Result<WrittenAnnotation> {
         let file_name = image.file_name.unwrap_or("");
         let whole = |text| WrittenAnnotation { text, data_yaml: None, left_out: Vec::new() };
         match self {
             Self::Coco => {
                 let mut file = CocoFile::new();
-                file.push_image(file_name, image.width, image.height, objects);
+                file.push_labelled(file_name, image.width, image.height, instances);
                 Ok(whole(file.to_json()))
             }
             Self::LabelMe => {
-                let without_line = objects.iter().filter(|object| object.grasp.is_none());
+                let objects = instances.iter().map(|instance| &instance.annotation);
+                let without_line = objects.filter(|object| object.grasp.is_none());
                 let left_out = without_line.filter_map(|object| {
                     let (label, width) = (&object.label, object.jaw_width?);
                     Some(format!("the jaws of `{label}`, {width} pixels apart: LabelMe's are marks of a grasp's line"))
                 });
                 let left_out = left_out.collect();
-                Ok(WrittenAnnotation { left_out, ..whole(labelme::write(file_name, image, objects)) })
+                Ok(WrittenAnnotation { left_out, ..whole(labelme::write(file_name, image, instances)) })
             }
-            Self::YoloPose => Ok(yolo_pose::write(image, objects)),
+            Self::YoloPose => Ok(yolo_pose::write(image, instances)),
             Self::OpenDr => Err(Error::ReadOnlyFormat { format: self.name() }),
         }
     }
 
-    pub(crate) fn read(self, bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    pub(crate) fn read(self, bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         match self {
-            Self::OpenDr => opendr::read(bytes, beside, image),
-            Self::YoloPose => yolo_pose::read(bytes, beside, image),
+            Self::OpenDr => opendr::read(bytes, beside, image).map(LabelledInstance::not_optional),
+            Self::YoloPose => yolo_pose::read(bytes, beside, image).map(LabelledInstance::not_optional),
             Self::LabelMe => labelme::read(&Node::root(&json::parse(bytes)?), image),
             Self::Coco => coco::read(&Node::root(&json::parse(bytes)?), image),
         }
@@ -158,6 +168,17 @@ impl Annotation {
     ///
     /// # Errors
     /// The errors of [`read`](Self::read); or the second file does not match.
+    pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
+        let instances = LabelledInstance::read_with(bytes, beside, image)?;
+        Ok(instances.into_iter().map(|instance| instance.annotation).collect())
+    }
+}
+
+impl LabelledInstance {
+    /// As [`Annotation::read_with`], with the flag `optional`, which is `false` in formats without it.
+    ///
+    /// # Errors
+    /// The errors of [`Annotation::read_with`].
     pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
         AnnotationFormat::of(bytes)?.read(bytes, beside, image)
     }

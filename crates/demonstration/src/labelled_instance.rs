@@ -22,6 +22,11 @@ impl LabelledInstance {
     pub fn new(annotation: Annotation, optional: bool) -> Self {
         Self { annotation, optional, place: String::new() }
     }
+
+    /// Instances without the flag `optional`.
+    pub(crate) fn not_optional(objects: Vec<Annotation>) -> Vec<Self> {
+        objects.into_iter().map(|object| Self::new(object, false)).collect()
+    }
 }
 
 /// The flag `optional` of an object with flags or attributes; `false` if absent.

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
-use crate::annotation::{Annotation, ImageFacts};
+use crate::annotation::ImageFacts;
 use crate::draft::{Border, Draft};
 use crate::foreign::is_foreign_shape;
 use crate::json::{Node, shorten};
@@ -13,7 +13,7 @@ use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads every object of a LabelMe file, which must have at least one.
-pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
     let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
         return Err(Error::NoObject {
@@ -21,7 +21,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
             found: "an empty list of shapes, or other things alone".into(),
         });
     }
-    Ok(instances.into_iter().map(|instance| instance.annotation).collect())
+    Ok(instances)
 }
 
 /// Reads the objects of a LabelMe file, if any, in the order of their first shapes.
@@ -165,10 +165,11 @@ fn object(shapes: Vec<Shape>) -> Result<Draft> {
 /// The LabelMe version of our files; LabelMe compares it with its own and warns about newer ones.
 const VERSION: &str = "5.4.1";
 
-/// Writes objects as LabelMe shows them: a group of a rectangle, two points and a polygon for each.
-pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation]) -> String {
+/// Writes objects as LabelMe shows them: a group of a rectangle, two points and a polygon for each. The rectangle has
+/// the flag `optional`.
+pub(crate) fn write(file_name: &str, image: &ImageFacts, instances: &[LabelledInstance]) -> String {
     let mut shapes = Vec::new();
-    for (object, group) in objects.iter().zip(1..) {
+    for (LabelledInstance { annotation: object, optional, .. }, group) in instances.iter().zip(1..) {
         let mut push = |label: &str, shape_type: &str, points: &[Point2<f64>]| {
             let points: Vec<Value> = points.iter().map(|point| json!([point.x, point.y])).collect();
             shapes.push(json!({
@@ -177,7 +178,7 @@ pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation])
                 "group_id": group,
                 "description": "",
                 "shape_type": shape_type,
-                "flags": {},
+                "flags": if *optional && shape_type == "rectangle" { json!({"optional": true}) } else { json!({}) },
                 "mask": null,
             }));
         };
@@ -214,7 +215,7 @@ pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation])
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::AnnotationFormat;
+    use crate::{Annotation, AnnotationFormat};
     use proptest::prelude::*;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 

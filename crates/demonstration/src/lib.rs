@@ -67,7 +67,7 @@ mod yolo_pose;
 pub use annotation::{Annotation, ImageFacts};
 pub use augmentation::{
     AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle, Windows,
-    sample_size,
+    output_size_of, sample_size,
 };
 pub use coco::CocoFile;
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};

@@ -18,6 +18,7 @@ use nalgebra::Point2;
 use crate::data_yaml::DataYaml;
 use crate::draft::Draft;
 use crate::keypoint_row::read_grasp;
+use crate::labelled_instance::LabelledInstance;
 use crate::written::WrittenAnnotation;
 use crate::{Annotation, Error, ImageFacts, Result};
 
@@ -180,12 +181,12 @@ fn keypoint_stride(rest: &[f64], data: &DataYaml) -> Option<usize> {
 }
 
 /// Writes the labels and their data.yaml.
-pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnotation {
+pub(crate) fn write(image: &ImageFacts, instances: &[LabelledInstance]) -> WrittenAnnotation {
     let [across, down] = [f64::from(image.width), f64::from(image.height)];
     let mut names: Vec<String> = Vec::new();
     let mut text = String::new();
     let mut left_out = Vec::new();
-    for object in objects {
+    for LabelledInstance { annotation: object, optional, .. } in instances {
         let class = names.iter().position(|name| *name == object.label).unwrap_or_else(|| {
             names.push(object.label.clone());
             names.len() - 1
@@ -207,6 +208,12 @@ pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnota
                 "the outline of `{}` ({} points): a YOLO-pose line has a box and keypoints only",
                 object.label,
                 outline.vertices.len()
+            ));
+        }
+        if *optional {
+            left_out.push(format!(
+                "the flag `optional` of `{}`: a YOLO-pose line has a box and keypoints only",
+                object.label
             ));
         }
         if let Some(width) = object.jaw_width {

@@ -12,7 +12,7 @@ use sdg_demonstration::{
 use sdg_grasp::{GraspModel, TurnedGrasp, Verification, turned_grasps, without_unmarked_parts};
 use serde_json::{Value, json};
 
-use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
+use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Errors, Instance, LabelledPicture, Tested, Totals, Truth, judge};
 use crate::statistics::{Share, wilson_interval};
 
 /// Index of the first held-out sample, far beyond the samples for validation and calibration.
@@ -92,6 +92,19 @@ pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
     annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
 }
 
+/// As [`HeldBackFigures::failure`], for these numbers of found parts and of samples without the part in which a
+/// detection was accepted.
+pub(crate) fn failure_of(found: Share, false_alarms: Share) -> Option<String> {
+    let reason = if 2 * found.count < found.of {
+        format!("it finds {} of {} parts", found.count, found.of)
+    } else if 2 * false_alarms.count > false_alarms.of {
+        format!("it accepts a detection in {} of {} without the part", false_alarms.count, false_alarms.of)
+    } else {
+        return None;
+    };
+    Some(format!("the model fails on its own held-out samples: {reason}; check that the marks are on the part"))
+}
+
 /// Results of a model on its held-out samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldBackFigures {
@@ -155,15 +168,7 @@ impl HeldBackFigures {
     /// The reason why the model is unusable: it finds fewer than half of the parts, or accepts a detection in more than
     /// half of the samples without the part. `None` if it is usable.
     pub fn failure(&self) -> Option<String> {
-        let Totals { found, false_alarms, .. } = &self.totals;
-        let reason = if 2 * found.count < found.of {
-            format!("it finds {} of {} parts", found.count, found.of)
-        } else if 2 * false_alarms.count > false_alarms.of {
-            format!("it accepts a detection in {} of {} without the part", false_alarms.count, false_alarms.of)
-        } else {
-            return None;
-        };
-        Some(format!("the model fails on its own held-out samples: {reason}; check that the marks are on the part"))
+        failure_of(self.found(), self.false_alarms())
     }
 
     /// Fraction of the parts that were found.
@@ -183,7 +188,17 @@ impl HeldBackFigures {
 
     /// Median errors of found parts: distance in pixels of the photo, and angle in degrees.
     pub fn median_errors(&self) -> Option<[f64; 2]> {
-        self.totals.errors.map(|errors| [self.photo_px * errors.median_px, errors.median_deg])
+        self.errors().map(|errors| [errors.median_px, errors.median_deg])
+    }
+
+    /// The errors of found parts, with distances in pixels of the photo.
+    fn errors(&self) -> Option<Errors> {
+        let in_photo = |errors: Errors| Errors {
+            median_px: self.photo_px * errors.median_px,
+            p95_px: self.photo_px * errors.p95_px,
+            ..errors
+        };
+        self.totals.errors.map(in_photo)
     }
 
     /// The median distance with its unit: millimetres if the model knows lengths.
@@ -239,7 +254,7 @@ impl HeldBackFigures {
     }
 
     /// The results as JSON: fractions as count and total, their intervals, and the errors. Distances are in pixels of
-    /// the samples, in percent of the diagonal and, if the model knows lengths, in millimetres.
+    /// the photo, in percent of the diagonal and, if the model knows lengths, in millimetres.
     pub fn to_json(&self) -> Value {
         json!({
             "samples": self.samples,
@@ -248,7 +263,7 @@ impl HeldBackFigures {
             "wrong": self.totals.wrong,
             "false_alarms": self.totals.false_alarms,
             "false_alarms_interval": wilson_interval(self.totals.false_alarms),
-            "errors": self.totals.errors,
+            "errors": self.errors(),
             "others_in_photo": self.others_in_photo,
             "turned_photos": self.turned.iter().map(|turned| turned.photo).collect::<Vec<_>>(),
         })
@@ -284,6 +299,26 @@ mod tests {
         assert_eq!(figures(9, 3).failure(), None);
         assert!(figures(8, 0).failure().unwrap().contains("finds 8 of 18 parts"));
         assert!(figures(18, 4).failure().unwrap().contains("in 4 of 6 without the part"));
+    }
+
+    #[test]
+    fn errors_are_in_pixels_of_the_photo() {
+        let mut figures = figures(18, 0);
+        let errors = Errors {
+            median_px: 1.5,
+            median_mm: None,
+            median_percent: 2.0,
+            median_deg: 0.5,
+            p95_px: 2.5,
+            p95_mm: None,
+            p95_percent: 3.0,
+            p95_deg: 1.0,
+        };
+        (figures.totals.errors, figures.photo_px) = (Some(errors), 6.0);
+        let printed = figures.to_json()["errors"].clone();
+        assert_eq!((&printed["median_px"], &printed["p95_px"]), (&json!(9.0), &json!(15.0)));
+        assert_eq!((&printed["p95_percent"], &printed["p95_deg"]), (&json!(3.0), &json!(1.0)));
+        assert!(figures.in_words().contains("median 9.0 px"), "{}", figures.in_words());
     }
 
     #[test]
@@ -329,7 +364,8 @@ mod tests {
     #[test]
     fn a_model_of_a_part_that_is_small_in_a_large_photo_is_usable() {
         let demonstrations = [key_on_a_table(4032, 3024)];
-        let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
         let model = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
         let figures = HeldBackFigures::of(&model, &demonstrations, 1).unwrap();
         assert_eq!(figures.failure(), None);

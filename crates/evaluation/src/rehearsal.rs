@@ -109,6 +109,8 @@ pub struct RehearsalErrors {
 
 /// Results of a rehearsal.
 pub struct Rehearsed {
+    /// Number of requested attempts.
+    pub planned: usize,
     /// The result of each attempt, in order.
     pub attempts: Vec<AttemptSummary>,
     /// External pictures of the first successful attempt, or of the last recorded one.
@@ -132,6 +134,12 @@ impl Rehearsed {
     /// Number of successful attempts: the part was held or, with a place, put down in it.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
+    }
+
+    /// The interruption in words; `None` if all requested attempts were made.
+    pub fn interruption(&self) -> Option<String> {
+        let done = self.attempts.len();
+        (done < self.planned).then(|| format!("interrupted after {done} of {} attempts", self.planned))
     }
 
     /// The failed attempts, and the reasons.
@@ -173,8 +181,13 @@ pub struct RehearsedAttempt {
 impl Rehearsal<'_> {
     /// Runs the attempts in order. `observe` is called after each one and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
-        let mut rehearsed =
-            Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
+        let mut rehearsed = Rehearsed {
+            planned: self.attempts as usize,
+            attempts: Vec::new(),
+            film: Vec::new(),
+            views: Vec::new(),
+            is_placing: self.place.is_some(),
+        };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
             let RehearsedAttempt { attempt, frames, view, .. } =

@@ -89,9 +89,10 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
 /// The results of the attempts, as the end of a sentence.
 fn lifted(page: &RunPage) -> String {
     let did = if page.rehearsed.is_placing { "put it down in its place" } else { "lifted it" };
+    let end = page.rehearsed.interruption().map(|told| format!("; it was {told}")).unwrap_or_default();
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
-        (0, of) => format!("and {did} in none of {of} attempts"),
-        (successes, of) => format!("and {did} in {successes} of {of} attempts"),
+        (0, of) => format!("and {did} in none of {of} attempts{end}"),
+        (successes, of) => format!("and {did} in {successes} of {of} attempts{end}"),
     }
 }
 
@@ -227,7 +228,8 @@ mod tests {
             why: String::new(),
             duration_secs: 0.0,
         };
-        let rehearsed = Rehearsed {
+        let mut rehearsed = Rehearsed {
+            planned: 5,
             attempts: vec![attempt(1), attempt(2)],
             film: Vec::new(),
             views: vec![None, Some(RgbImage::new(8, 8))],
@@ -235,5 +237,8 @@ mod tests {
         };
         let page = Report::new("rehearsal").section(last_looks(&rehearsed)).to_html().unwrap();
         assert!(page.contains("Attempt 2") && !page.contains("Attempt 1"), "{page}");
+        assert_eq!(rehearsed.interruption().unwrap(), "interrupted after 2 of 5 attempts");
+        rehearsed.planned = 2;
+        assert_eq!(rehearsed.interruption(), None);
     }
 }

@@ -31,6 +31,7 @@ pub fn run_json(page: &RunPage, teach_seconds: Option<f64>, report: &Path) -> Va
         "object": object.name,
         "part": object.description,
         "attempts": rehearsed.attempts.len(),
+        "interrupted": rehearsed.interruption().is_some(),
         "successes": rehearsed.successes(),
         "failures": rehearsed.failures(),
         "report": report.display().to_string(),

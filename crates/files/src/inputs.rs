@@ -50,14 +50,6 @@ fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Checks, before the first output is written, that no output of this process would replace an input.
-///
-/// # Errors
-/// A path leads to an input.
-pub fn check_are_no_inputs(paths: impl IntoIterator<Item = PathBuf>) -> Result<()> {
-    paths.into_iter().try_for_each(|path| check_is_no_input(&path, None))
-}
-
 /// Registers a file, or a folder and its files, read by code outside this crate: [`write`] does not replace them.
 pub fn keep(path: &Path) {
     let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());

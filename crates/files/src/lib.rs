@@ -4,6 +4,8 @@
 //! path ─ read (size limit, registered as an input) ─ bytes
 //! bytes ─ write: no input, no file of another kind is replaced ─ write_atomically: temporary file, sync, rename ─ path
 //! path ─ Lock: exclusive or shared, until it is dropped; WriterLock: names the process that writes a file
+//! photo ─ marks_of_photo: the possible files of its marks
+//! text ─ print_stderr: without the panic of eprintln!
 //! ```
 //!
 //! Errors name the path and the system's reason. Deliberately absent: the meaning of the bytes, options, and texts for
@@ -33,6 +35,8 @@ mod folder;
 mod inputs;
 mod kind;
 mod lock;
+mod marks;
+mod standard_error;
 
 pub use atomic::{AtomicFile, write_atomically};
 pub use bounded::{read, read_bounded};
@@ -40,7 +44,8 @@ pub use drawing::{write_drawing, write_png};
 pub use error::{FileError, Result};
 pub use folder::{entries, has_extension, prepare_folder};
 pub use inputs::{
-    check_are_no_inputs, check_extendable, check_readable, check_replaceable, check_writable, create, extend,
-    is_same_file, keep, write,
+    check_extendable, check_readable, check_replaceable, check_writable, create, extend, is_same_file, keep, write,
 };
 pub use lock::{Access, Lock, WriterLock};
+pub use marks::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};
+pub use standard_error::print_stderr;

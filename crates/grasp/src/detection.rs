@@ -55,6 +55,14 @@ impl GraspDetection {
         region.has(&self.grasp.center(), &self.outline.clone().unwrap_or_else(bounds))
     }
 
+    /// Whether the part lies in the searched region of a picture; without a region, whether the picture of this width
+    /// and height contains the grasp point: an arm cannot grasp at a point that no camera shows.
+    pub(crate) fn lies_within(&self, region: Option<&SearchRegion>, picture: [u32; 2]) -> bool {
+        let [width, height] = picture.map(f64::from);
+        let is_shown = || (0.0..width).contains(&self.grasp.x) && (0.0..height).contains(&self.grasp.y);
+        region.map_or_else(is_shown, |region| self.lies_in(region))
+    }
+
     /// The reason for a refusal, in words: the strongest objection. `None` for an accepted detection.
     pub fn refused(&self) -> Option<&'static str> {
         if self.is_accepted() {

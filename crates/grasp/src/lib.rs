@@ -130,8 +130,8 @@ pub use taught::TaughtDemonstration;
 pub use taught_marks::TaughtMarks;
 #[cfg(feature = "teach")]
 pub use teach::{
-    FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, TurnedGrasp, check_teaching_region, teach,
-    turned_grasps, without_unmarked_parts,
+    AcceptedNegative, FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, TurnedGrasp,
+    check_teaching_region, teach, turned_grasps, without_unmarked_parts,
 };
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;

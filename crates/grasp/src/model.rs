@@ -229,7 +229,8 @@ impl GraspModel {
     pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let size = [image.width(), image.height()];
         let Some(region) = self.region() else {
-            return self.find_in(image, &SearchWindow::whole(size), verification, |_| true).await;
+            let counts = |detection: &GraspDetection| detection.lies_within(None, size);
+            return self.find_in(image, &SearchWindow::whole(size), verification, counts).await;
         };
         region.check(size)?;
         let window = SearchWindow::about(&region.bounds(), region, size, &self.demonstrations)?;

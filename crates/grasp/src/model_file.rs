@@ -43,9 +43,6 @@ use crate::taught_marks::TaughtMarks;
 /// The version that this code writes. It is increased by any change that an older reader would misread.
 pub const FORMAT_VERSION: u32 = 3;
 
-/// Largest distance of a photo's centre from a cut-out's corner along each axis, in pixels of the cut-out: more than the
-/// longest side of any photo.
-const MAX_PHOTO_MIDDLE_PX: f64 = 1e5;
 /// Maximum number of turns of a symmetry: one per degree.
 const MAX_TURNS: u32 = 360;
 
@@ -186,10 +183,12 @@ fn check_values(facts: &TeachingFacts, marks: &[TaughtMarks]) -> Result<()> {
         {
             return damaged("a photo with pixels".to_owned(), format!("{width} × {height}"));
         }
+        // A photo may be one pixel high.
+        let max_px = ImageLimits::default().max_pixels as f64;
         if let Some([x, y]) = photo_middle
-            && x.abs().max(y.abs()) > MAX_PHOTO_MIDDLE_PX
+            && x.abs().max(y.abs()) > max_px
         {
-            let expected = format!("a photo whose centre is at most {MAX_PHOTO_MIDDLE_PX} pixels from the part");
+            let expected = format!("a photo whose centre is at most {max_px} pixels from the part");
             return damaged(expected, format!("({x}, {y})"));
         }
     }
@@ -489,7 +488,10 @@ mod tests {
         let photo = message(|model| model.demonstrations[0].marks.photo_size = Some([640, 0]));
         assert!(photo.contains("a photo with pixels, found 640 × 0"), "{photo}");
         let middle = message(|model| model.demonstrations[0].marks.photo_middle = Some([20.0, -1e9]));
-        assert!(middle.contains("at most 100000 pixels from the part, found (20, -1000000000)"), "{middle}");
+        assert!(middle.contains("at most 210000000 pixels from the part, found (20, -1000000000)"), "{middle}");
+        let mut long = untaught(ModelKind::S);
+        long.demonstrations[0].marks.photo_middle = Some([20.0, 150_000.0]);
+        assert!(GraspModel::from_bytes(&long.to_bytes().unwrap(), &Device::flex()).is_ok());
         let none = message(|model| model.facts.symmetry = RotationalSymmetry::Fold(0));
         assert!(none.contains("a symmetry of 1 to 360 turns, found 0"), "{none}");
         let many = message(|model| model.facts.symmetry = RotationalSymmetry::Fold(361));

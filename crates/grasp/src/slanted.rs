@@ -140,12 +140,15 @@ pub(crate) fn suggested_slant(
     (best_gain(&gains) >= required).then_some(slant)
 }
 
-/// The sightings of best agreement. Of a part found by both network and search, only the better one: it takes one place,
-/// so that other parts also count. Matches of the search alone are apart.
+/// The sightings of best agreement. Of a part found more than once (by network and search, with two photos, or at two
+/// sizes), only the best one: it takes one place, so that other parts also count. Matches of one search are apart.
 fn best_places<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Vec<&'s Sighting<'a>> {
-    let is_searched = |sighting: &Sighting<'_>| sighting.turn_source == TurnSource::Search;
+    let search = |sighting: &Sighting<'_>| {
+        let is_searched = sighting.turn_source == TurnSource::Search;
+        is_searched.then_some((sighting.placed.demonstration_idx, sighting.placed.range_idx))
+    };
     let is_same = |one: &Sighting<'_>, other: &Sighting<'_>| {
-        !(is_searched(one) && is_searched(other))
+        !(search(one).is_some() && search(one) == search(other))
             && are_outlines_of_same_part(&one.placed.outline(), &other.placed.outline())
     };
     let mut likely: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
@@ -481,18 +484,19 @@ mod tests {
 
     #[cfg(feature = "teach")]
     #[test]
-    fn a_part_found_by_network_and_search_takes_one_place() {
+    fn a_part_found_by_two_searches_or_by_network_and_search_takes_one_place() {
         use crate::colors::Colors;
         use crate::taught::TaughtDemonstration;
         use crate::verification::PlacedDemonstration;
         use sdg_shape::Evidence;
 
         let taught = TaughtDemonstration::new(&crate::teach::tests::demonstration()).unwrap();
-        let sighting = |x: f64, agreement: f64, turn_source: TurnSource| {
+        let sighting = |x: f64, agreement: f64, (turn_source, demonstration_idx, range_idx)| {
             let pose = PlanarSimilarity::translation(x, 0.0);
             let placed = PlacedDemonstration {
                 demonstration: &taught,
-                demonstration_idx: 0,
+                demonstration_idx,
+                range_idx,
                 image_from_cutout: pose,
                 image_from_marks: pose,
                 colors: Colors::There,
@@ -512,15 +516,18 @@ mod tests {
         let places = |sightings: &[Sighting<'_>]| -> Vec<f64> {
             best_places(sightings).iter().map(|sighting| sighting.placed.image_from_cutout.tx).collect()
         };
-        let five = |of_network: TurnSource| {
+        let five = |first: (TurnSource, usize, usize)| {
             let twice = |k: i32| {
                 let (x, agreement) = (200.0 * f64::from(k), 0.9 - 0.1 * f64::from(k));
-                [sighting(x, agreement, of_network), sighting(x + 2.0, agreement - 0.01, TurnSource::Search)]
+                [sighting(x, agreement, first), sighting(x + 2.0, agreement - 0.01, (TurnSource::Search, 0, 0))]
             };
             (0..5).flat_map(twice).collect::<Vec<_>>()
         };
-        assert_eq!(places(&five(TurnSource::Keypoints)), [0.0, 200.0, 400.0, 600.0]);
-        // The search alone has already decided which of its matches are apart.
-        assert_eq!(places(&five(TurnSource::Search)), [0.0, 2.0, 200.0, 202.0]);
+        // By the network; by a search with another photo, and for another range of sizes.
+        for first in [(TurnSource::Keypoints, 0, 0), (TurnSource::Search, 1, 0), (TurnSource::Search, 0, 1)] {
+            assert_eq!(places(&five(first)), [0.0, 200.0, 400.0, 600.0], "{first:?}");
+        }
+        // A search has already decided which of its matches are apart.
+        assert_eq!(places(&five((TurnSource::Search, 0, 0))), [0.0, 2.0, 200.0, 202.0]);
     }
 }

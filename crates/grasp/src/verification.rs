@@ -76,6 +76,7 @@ struct SizedDemonstration<'a> {
     demonstration: &'a TaughtDemonstration,
     demonstration_idx: usize,
     range: SizeRange,
+    range_idx: usize,
     working: WorkingSize,
     prepared: Arc<Prepared>,
     colors: Colors,
@@ -96,13 +97,15 @@ impl<'a> SearchedImage<'a> {
         let colors = Colors::of(image);
         for (demonstration_idx, demonstration) in demonstrations.iter().enumerate() {
             let tolerance = &demonstration.check().search.scales;
-            for range in SizeRange::all(demonstration.marks.photo_size, shot.size, tolerance) {
+            let ranges = SizeRange::all(demonstration.marks.photo_size, shot.size, tolerance);
+            for (range_idx, range) in ranges.into_iter().enumerate() {
                 if let Ok((working, prepared)) = demonstration.prepared(&range, colors) {
                     let view_idx = searched.view(image, shot, working.halvings, demonstration);
                     let sized = SizedDemonstration {
                         demonstration,
                         demonstration_idx,
                         range,
+                        range_idx,
                         working,
                         prepared,
                         colors,
@@ -144,6 +147,8 @@ impl<'a> SearchedImage<'a> {
 pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) demonstration_idx: usize,
+    /// The index of the range of sizes in which the demonstration was searched; 0 for a followed part.
+    pub(crate) range_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
     /// The pose of the marks and their surroundings, which may be shifted relative to the outline.
     pub(crate) image_from_marks: PlanarSimilarity,
@@ -238,6 +243,7 @@ impl<'a> SizedDemonstration<'a> {
         PlacedDemonstration {
             demonstration: self.demonstration,
             demonstration_idx: self.demonstration_idx,
+            range_idx: self.range_idx,
             image_from_cutout,
             image_from_marks: self.image_from_cutout(&marks),
             colors: self.colors,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts};
+use sdg_demonstration::{AnnotationFormat, DeclaredImage, ImageFacts, LabelledInstance};
 
 use crate::annotation_files::{AnnotationFile, write_marks};
 use crate::error::ImageError;
@@ -37,15 +37,15 @@ pub fn convert_annotation(
     format: AnnotationFormat,
 ) -> Result<ConvertedAnnotation> {
     let file = AnnotationFile::read(input)?;
-    let (declared, objects) = match image {
+    let (declared, instances) = match image {
         Some(path) => marks_on(&file, path)?,
         None => declared_marks(&file, input)?,
     };
     let DeclaredImage { file_name, width, height } = &declared;
     let facts = ImageFacts { width: *width, height: *height, file_name: file_name.as_deref() };
-    let written = format.write(&facts, &objects)?;
-    let data_yaml = write_marks(output, &written, &facts, &objects)?;
-    let labels = objects.into_iter().map(|object| object.label).collect();
+    let written = format.write_labelled(&facts, &instances)?;
+    let data_yaml = write_marks(output, &written, &facts, &instances)?;
+    let labels = instances.into_iter().map(|instance| instance.annotation.label).collect();
     Ok(ConvertedAnnotation {
         input_format: file.format,
         image: declared,
@@ -55,7 +55,7 @@ pub fn convert_annotation(
     })
 }
 
-fn marks_on(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, Vec<Annotation>)> {
+fn marks_on(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, Vec<LabelledInstance>)> {
     let image = read_image(path)?;
     let file_name = path.file_name().map(|name| name.to_string_lossy().into_owned());
     let declared = DeclaredImage { file_name, width: image.width(), height: image.height() };
@@ -63,7 +63,7 @@ fn marks_on(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, Vec<An
 }
 
 /// The marks on the only image that the file declares.
-fn declared_marks(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, Vec<Annotation>)> {
+fn declared_marks(file: &AnnotationFile, path: &Path) -> Result<(DeclaredImage, Vec<LabelledInstance>)> {
     let mut all = AnnotationFormat::declared_images(file.bytes()).with_context(|| path.display().to_string())?;
     let declared = match all.len() {
         1 => all.remove(0),

@@ -4,18 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, LabelledInstance, WrittenAnnotation};
+use sdg_files::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};
 
 use crate::marks_check::MarkedPhoto;
 
 /// Maximum size of an annotation file with an embedded image.
 pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
-/// Name of the file with the labels of a YOLO dataset.
-pub const DATA_YAML: &str = "data.yaml";
-/// Other common names, which are tried after [`DATA_YAML`] in each folder.
-const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
-/// Number of folders in which data.yaml is searched, from the label file's folder upwards, as in labels/train/a.txt.
-const MAX_PARENT_FOLDERS: usize = 3;
 
 /// An annotation file and the files that belong to it.
 pub struct AnnotationFile {
@@ -48,9 +43,9 @@ impl AnnotationFile {
     ///
     /// # Errors
     /// The errors of [`Annotation::read_with`].
-    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
-        Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
+        LabelledInstance::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
             Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),
             None => self.path.display().to_string(),
         })
@@ -60,11 +55,15 @@ impl AnnotationFile {
     ///
     /// # Errors
     /// The errors of [`Self::objects`], [`MarkedPhoto::checked`] and [`Annotation::check`].
-    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
+    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<LabelledInstance>> {
         let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
         let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
-        let objects = marked.checked(|facts| self.objects(facts))?;
-        objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
+        let objects =
+            marked.checked(|facts| self.objects(facts), |instance: &LabelledInstance| &instance.annotation)?;
+        objects
+            .iter()
+            .try_for_each(|instance| instance.annotation.check())
+            .with_context(|| self.path.display().to_string())?;
         // After all fallible steps, so that an error is printed alone.
         let (width, height) = image.dimensions();
         self.report_skipped(&ImageFacts { width, height, file_name: path.to_str() });
@@ -74,7 +73,7 @@ impl AnnotationFile {
     /// Prints the entries for an image that do not mark a part.
     pub fn report_skipped(&self, image: &ImageFacts) {
         for foreign in Annotation::passed_over(&self.bytes, image) {
-            eprintln!("{}: skipped {foreign}", self.path.display());
+            sdg_files::print_stderr(format_args!("{}: skipped {foreign}\n", self.path.display()));
         }
     }
 
@@ -84,27 +83,12 @@ impl AnnotationFile {
     }
 }
 
-/// Finds the marks beside a photo: `photo.coco.json`, `photo.json` (COCO or LabelMe) or `photo.txt` (YOLO-pose); for a
-/// YOLO dataset with pictures below `images`, a text file of the photo's name below `labels`. `sdg annotate` writes
-/// `photo.coco.json` only if another tool's `photo.json` must be kept.
+/// Finds the marks of a photo among [`marks_of_photo`].
 ///
 /// # Errors
 /// No such file exists. The message lists the searched names and how to create one.
 pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
-    let in_labels = |photo: &Path| {
-        let folder = photo.parent()?;
-        let mut parts: Vec<_> = folder.components().map(|part| part.as_os_str()).collect();
-        let images = parts.iter().rposition(|part| *part == "images")?;
-        parts[images] = "labels".as_ref();
-        let folder: PathBuf = parts.into_iter().collect();
-        Some(folder.join(photo.with_extension("txt").file_name()?))
-    };
-    let looked_for: Vec<PathBuf> = ["coco.json", "json", "txt"]
-        .map(|extension| photo.with_extension(extension))
-        .into_iter()
-        // The current folder may be `images` or below it.
-        .chain(in_labels(photo).or_else(|| in_labels(&from_root(photo))))
-        .collect();
+    let looked_for = marks_of_photo(photo);
     match looked_for.iter().find(|path| path.is_file()) {
         Some(found) => Ok(found.clone()),
         None => {
@@ -119,26 +103,6 @@ pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The path from the root. `.` and `..` at its beginning are replaced; the names after them, also those of links, are
-/// kept.
-fn from_root(path: &Path) -> PathBuf {
-    let start = path.ancestors().find(|start| start.file_name().is_none()).unwrap_or(path);
-    let folder = if start.as_os_str().is_empty() { Path::new(".") } else { start };
-    match (folder.canonicalize(), path.strip_prefix(start)) {
-        (Ok(folder), Ok(rest)) => folder.join(rest),
-        _ => path.to_owned(),
-    }
-}
-
-/// The folder of a file and the folders above it. The names in the path are kept; folders above them have their path
-/// from the root.
-fn folders_above(path: &Path) -> Vec<PathBuf> {
-    let named = path.ancestors().skip(1).take_while(|folder| folder.file_name().is_some()).count() + 1;
-    let above = from_root(path);
-    let above = above.ancestors().skip(1 + named);
-    path.ancestors().skip(1).take(named).chain(above).map(Path::to_owned).collect()
-}
-
 /// The second file that [`AnnotationFile::read`] reads for this annotation file; `None` if there is none, or if the
 /// annotation file cannot be read.
 pub fn file_beside(annotation: &Path) -> Option<PathBuf> {
@@ -149,20 +113,8 @@ pub fn file_beside(annotation: &Path) -> Option<PathBuf> {
 /// The file that belongs to `path`, if it exists.
 fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     match format {
-        AnnotationFormat::OpenDr => {
-            let name = path.file_name()?.to_str()?;
-            let other = match (name.strip_prefix("boxes"), name.strip_prefix("kps")) {
-                (Some(rest), _) => format!("kps{rest}"),
-                (_, Some(rest)) => format!("boxes{rest}"),
-                _ => return None,
-            };
-            Some(path.with_file_name(other)).filter(|other| other.exists())
-        }
-        AnnotationFormat::YoloPose => {
-            let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
-            let folders = folders_above(path).into_iter().take(MAX_PARENT_FOLDERS);
-            folders.flat_map(|folder| names().map(move |name| folder.join(name))).find(|file| file.exists())
-        }
+        AnnotationFormat::OpenDr => other_npy_of(path),
+        AnnotationFormat::YoloPose => data_yaml_of(path),
         _ => None,
     }
 }
@@ -176,11 +128,11 @@ pub fn write_marks(
     output: &Path,
     written: &WrittenAnnotation,
     image: &ImageFacts,
-    objects: &[Annotation],
+    instances: &[LabelledInstance],
 ) -> Result<Option<PathBuf>> {
     let existing = written.data_yaml.as_ref().and_then(|_| beside(output, AnnotationFormat::YoloPose));
     if let Some(path) = &existing {
-        check_labels(path, written, image, objects)?;
+        check_labels(path, written, image, instances)?;
     }
     sdg_files::write(output, written.text.as_bytes())?;
     match &written.data_yaml {
@@ -194,11 +146,16 @@ pub fn write_marks(
 }
 
 /// Checks that an existing file gives these objects their labels.
-fn check_labels(path: &Path, written: &WrittenAnnotation, image: &ImageFacts, objects: &[Annotation]) -> Result<()> {
+fn check_labels(
+    path: &Path,
+    written: &WrittenAnnotation,
+    image: &ImageFacts,
+    instances: &[LabelledInstance],
+) -> Result<()> {
     let there = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
     let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
         .with_context(|| path.display().to_string())?;
-    for (found, expected) in read.iter().zip(objects) {
+    for (found, expected) in read.iter().zip(instances.iter().map(|instance| &instance.annotation)) {
         if found.label != expected.label {
             bail!(
                 "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Annotation, Demonstration};
 
 use crate::annotation_files::{AnnotationFile, beside_photo};
 use crate::error::NotAPair;
@@ -16,11 +16,13 @@ use crate::pictures::read_image;
 pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
     let image = read_image(image_path)?;
     let file = AnnotationFile::read(annotation_path)?;
-    let mut objects = file.objects_on(image_path, &image)?;
+    let instances = file.objects_on(image_path, &image)?;
+    let mut objects: Vec<Annotation> = instances.into_iter().map(|instance| instance.annotation).collect();
     // Objects without a grasp are boxes that another tool or person made.
     if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
         for other in objects.extract_if(.., |object| object.grasp.is_none()) {
-            eprintln!("{}: skipped `{}`, which has no grasp", annotation_path.display(), other.label);
+            let path = annotation_path.display();
+            sdg_files::print_stderr(format_args!("{path}: skipped `{}`, which has no grasp\n", other.label));
         }
     }
     if objects.len() != 1 {

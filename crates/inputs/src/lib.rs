@@ -53,7 +53,7 @@ pub use camera_update::CameraUpdate;
 pub use error::{ConfigError, ImageError, NotAPair};
 pub use error_line::{first_names, one_line};
 pub use models::{check_replaces_a_model, read_model};
-pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};
+pub use picture_inputs::{DrawnNames, PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};
 pub use pictures::{
     UNREADABLE_EXTENSIONS, check_is_not_turned, read_image, read_image_in, read_sensor_pixels_if_turned,
     read_standard_input_image, why_unreadable,

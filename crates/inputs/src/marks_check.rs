@@ -44,10 +44,10 @@ impl MarkedPhoto<'_> {
     /// Reports an applied orientation. Called after all fallible steps.
     fn report_orientation(&self, is_turned: bool) {
         if is_turned {
-            eprintln!(
-                "{}: rotated as its Exif orientation says; the marks are read on the rotated photo",
+            sdg_files::print_stderr(format_args!(
+                "{}: rotated as its Exif orientation says; the marks are read on the rotated photo\n",
                 self.photo.display()
-            );
+            ));
         }
     }
 
@@ -90,9 +90,13 @@ impl MarkedPhoto<'_> {
     /// # Errors
     /// The errors of [`Self::upright`]; or the marks also fit if their numbers are read in another way; or the file of
     /// the marks contains the name of another existing picture, and the marks fit that picture as well.
-    pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
-        let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
-        let annotations: Vec<&Annotation> = marked.iter().collect();
+    pub fn checked<T>(
+        &self,
+        read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
+        annotation: impl Fn(&T) -> &Annotation,
+    ) -> Result<Vec<T>> {
+        let (marked, is_turned) = self.read_upright(read, &annotation)?;
+        let annotations: Vec<&Annotation> = marked.iter().map(&annotation).collect();
         if let Some(other) = self.other_picture(&annotations) {
             bail!("{}: {other}", self.marks.display());
         }

@@ -1,6 +1,6 @@
 //! Pictures given as arguments: files, folders, standard input.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
@@ -39,15 +39,44 @@ impl PictureInput {
         }
     }
 
-    /// An unused file name for the drawing: pictures in different folders may have equal names.
-    pub fn drawn_name(&self, taken: &mut BTreeSet<String>) -> String {
-        let stem = match self {
-            Self::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            Self::StandardInput => "stdin".to_owned(),
-        };
-        let numbered = |number: u32| if number == 1 { format!("{stem}.png") } else { format!("{stem}-{number}.png") };
-        let name = (1..).map(numbered).find(|name| !taken.contains(name)).unwrap_or_default();
-        taken.insert(name.clone());
+    /// The file's name, without and with its extension.
+    fn file_names(&self) -> [String; 2] {
+        match self {
+            Self::File(path) => {
+                [path.file_stem(), path.file_name()].map(|name| name.unwrap_or_default().to_string_lossy().into_owned())
+            }
+            Self::StandardInput => ["stdin".to_owned(), "stdin".to_owned()],
+        }
+    }
+}
+
+/// File names for the drawings of pictures.
+#[derive(Debug)]
+pub struct DrawnNames {
+    /// Names that several pictures have apart from their extensions.
+    shared: BTreeSet<String>,
+    taken: BTreeSet<String>,
+}
+
+impl DrawnNames {
+    /// For the drawings of these pictures.
+    pub fn of<'a>(pictures: impl IntoIterator<Item = &'a PictureInput>) -> Self {
+        let mut names: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for [stem, name] in pictures.into_iter().map(PictureInput::file_names) {
+            names.entry(stem).or_default().insert(name);
+        }
+        let shared = names.into_iter().filter(|(_, names)| names.len() > 1).map(|(stem, _)| stem).collect();
+        Self { shared, taken: BTreeSet::new() }
+    }
+
+    /// The picture's name with the extension `.png`. Pictures that differ only in their extensions keep these before it;
+    /// pictures of one name, in different folders, are numbered.
+    pub fn name_of(&mut self, picture: &PictureInput) -> String {
+        let [stem, name] = picture.file_names();
+        let own = if self.shared.contains(&stem) { name } else { stem };
+        let numbered = |number: u32| if number == 1 { format!("{own}.png") } else { format!("{own}-{number}.png") };
+        let name = (1..).map(numbered).find(|name| !self.taken.contains(name)).unwrap_or_default();
+        self.taken.insert(name.clone());
         name
     }
 }
@@ -108,7 +137,7 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         let inputs = pictures_of_argument(folder.path()).unwrap();
-        let names: Vec<String> = inputs.pictures.iter().map(|input| input.drawn_name(&mut BTreeSet::new())).collect();
+        let names = drawn_names(&inputs.pictures);
         assert_eq!(names, ["a.png", "b.png", "c.png", "phone.png"]);
         let skipped = inputs.skipped.unwrap();
         assert!(skipped.ends_with("skipped files that are not pictures: a.json, more"), "{skipped}");
@@ -116,13 +145,20 @@ mod tests {
         assert!(empty.contains("expected pictures") && empty.contains("found 0 other"), "{empty}");
     }
 
+    fn drawn_names(pictures: &[PictureInput]) -> Vec<String> {
+        let mut names = DrawnNames::of(pictures);
+        pictures.iter().map(|picture| names.name_of(picture)).collect()
+    }
+
     #[test]
-    fn drawn_pictures_of_one_name_do_not_replace_each_other() {
-        let mut taken = BTreeSet::new();
-        let names: Vec<String> = ["a/1.png", "b/1.jpg", "1-2.png", "c/1.png"]
-            .iter()
-            .map(|path| PictureInput::File(path.into()).drawn_name(&mut taken))
-            .collect();
-        assert_eq!(names, ["1.png", "1-2.png", "1-2-2.png", "1-3.png"]);
+    fn drawings_have_the_names_of_their_pictures_in_any_order() {
+        let named = |paths: &[&str]| {
+            let pictures: Vec<_> = paths.iter().map(|path| PictureInput::File(path.into())).collect();
+            drawn_names(&pictures)
+        };
+        assert_eq!(named(&["part.jpg", "a.png", "part.png"]), ["part.jpg.png", "a.png", "part.png.png"]);
+        assert_eq!(named(&["part.png", "part.jpg"]), ["part.png.png", "part.jpg.png"]);
+        // No drawing replaces another one.
+        assert_eq!(named(&["a/1.png", "1-2.png", "c/1.png"]), ["1.png", "1-2.png", "1-3.png"]);
     }
 }

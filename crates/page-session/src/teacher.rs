@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use nalgebra::Point2;
 use sdg_annotate::{
-    CameraPictures, Figures, GraspTeacher, LiveOptions, NegativesRefused, Region, SizeCheck, TaughtModel,
+    CameraPictures, Figures, GraspTeacher, LiveOptions, NegativesRefused, Region, Searched, SizeCheck, TaughtModel,
     TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_camera::{Address, Camera, OpenOptions, PixelFrame};
@@ -74,9 +74,22 @@ impl GraspTeacher for PageTeacher {
         Ok(check_region_from_above(&region, &seen, &camera.over_table, &lengths)?)
     }
 
-    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
-        let model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
-        Ok(Box::new(PageModel::new(self.detector(model)?, summary.clone(), bytes.to_vec())))
+    fn open(
+        &self,
+        bytes: &[u8],
+        summary: &TaughtSummary,
+        searched: Option<Searched>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let mut model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
+        if searched.is_some() {
+            // The model's region, which is replaced, may not fit this camera's pictures.
+            model = model.with_region(None)?;
+        }
+        let mut detector = self.detector(model)?;
+        if let Some(searched) = searched {
+            detector.look_in(searched.region().as_ref().map(search_region))?;
+        }
+        Ok(Box::new(PageModel::new(detector, summary.clone(), bytes.to_vec())))
     }
 }
 
@@ -212,7 +225,57 @@ fn step(event: &TeachingEvent) -> TeachingStep {
 mod tests {
     use super::*;
     use image::RgbImage;
-    use sdg_annotate::{Session, SessionOptions};
+    use sdg_annotate::{ModelKind, Session, SessionOptions};
+    use std::path::Path;
+
+    #[test]
+    fn a_model_opens_with_a_smaller_camera_if_its_region_is_replaced() {
+        let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
+        let folder = tempfile::tempdir().unwrap();
+        let text = std::fs::read_to_string(datasets.join("workcell/camera.yaml")).unwrap();
+        let small = text
+            .replace("image_width: 640", "image_width: 320")
+            .replace("image_height: 480", "image_height: 240")
+            .replace("[550.0, 0.0, 319.5, 0.0, 550.0, 239.5,", "[275.0, 0.0, 159.5, 0.0, 275.0, 119.5,");
+        let path = folder.path().join("camera.yaml");
+        std::fs::write(&path, small).unwrap();
+        let [large, small] = [datasets.join("workcell/camera.yaml"), path].map(|path| {
+            let camera = Some((CameraFile::read(&path).unwrap(), [0.016, 0.009]));
+            PageTeacher { preset: Preset::default(), camera }
+        });
+        let pendulum = datasets.join("demonstrations/pendulum");
+        let [photo, marks] = ["image.png", "annotation.json"].map(|name| pendulum.join(name));
+        let demonstrations = vec![sdg_inputs::demonstrations::read_pair(&photo, &marks).unwrap()];
+        let material = TeachingMaterial { demonstrations, negatives: Vec::new() };
+        let request = TeachRequest {
+            model: ModelKind::S,
+            time_budget_secs: None,
+            steps: None,
+            symmetry: 1,
+            fixed_height: false,
+            seed: 1,
+            region: Some(Region { x: 0, y: 0, width: 640, height: 480, picture: Some([640, 480]) }),
+        };
+        let taught = large.teach_on_trial(&material, &request).unwrap();
+        let bytes = taught.to_bytes().unwrap();
+        assert!(small.open(&bytes, &taught.summary(), None).is_err(), "its region is beyond the smaller pictures");
+
+        // A project in which the whole picture was chosen.
+        std::fs::create_dir(folder.path().join("models")).unwrap();
+        std::fs::write(folder.path().join("models/pendulum.sdg"), &bytes).unwrap();
+        let project = r#"{"format": 1, "label": "pendulum", "photos": [], "tried": [], "removed": [], "current_model": 0,
+            "searched": "all", "models": [{"file": "pendulum.sdg", "taught_secs": 1, "photos": 1, "negatives": 0,
+            "material": "", "summary": {"model": "S", "object": "pendulum", "seconds": 1.0, "figures": null,
+            "negatives": null}}]}"#;
+        std::fs::write(folder.path().join("sdg-project.json"), project).unwrap();
+        let options = SessionOptions { project: Some(folder.path().to_owned()), ..SessionOptions::default() };
+        let session = Session::open(&options, Arc::new(small)).unwrap();
+        let view = session.view();
+        assert!(view.models[0].is_current && view.region.is_none(), "{:?}", view.notes);
+        session.use_version(0).unwrap();
+        assert!(session.view().models[0].is_current);
+        assert!(session.compare_versions(0, 0).is_ok());
+    }
 
     #[test]
     fn the_page_shows_the_opening_that_is_taught_where_a_file_states_none() {

@@ -94,7 +94,14 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
         return ppm::decode_ppm(bytes, |width, height| check_size(width, height, limits));
     }
     let (format, name) = format_of(bytes)?;
-    let damaged = |error: image::ImageError| PictureError::DamagedImage { format: name, reason: error.to_string() };
+    let damaged = |error: image::ImageError| match &error {
+        image::ImageError::Unsupported(_) => PictureError::UnsupportedKind {
+            format: name,
+            found: error.to_string(),
+            remedy: "export it as PNG or JPEG, with 8 bits per channel",
+        },
+        _ => PictureError::DamagedImage { format: name, reason: error.to_string() },
+    };
     // Checked before the decoder, whose error for an empty PNG is less specific.
     if let Some([width, height]) = png_header_size(bytes) {
         check_size(width, height, limits)?;

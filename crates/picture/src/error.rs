@@ -15,7 +15,7 @@ pub enum PictureError {
         /// A description of the bytes.
         found: String,
     },
-    /// The image is truncated, damaged, or of an unsupported kind.
+    /// The image is truncated or damaged.
     #[error("damaged {format} image: {reason}")]
     DamagedImage { format: &'static str, reason: String },
     /// An unsupported variant of a format, and what the user can do.

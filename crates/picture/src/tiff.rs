@@ -64,15 +64,13 @@ pub(crate) fn is_big_tiff(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// There are several full-size pages; the file is a raw photo; a palette does not have 8 bits; or the values of a tag
-/// of the first page, except a private tag, need more bytes than the file has. The decoder would allocate memory for
+/// of the first or the main page, except a private tag, need more bytes than the file has. The decoder would allocate memory for
 /// such values before reading them. Structures that cannot be parsed are left to the decoder.
 pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let whole = FullPage { bytes: Cow::Borrowed(bytes), palette: None };
     let Some(file) = File::new(bytes) else { return Ok(whole) };
-    let first = file.first_page().and_then(|at| file.page(at));
-    if let Some(entry) = first.iter().flat_map(|page| &page.entries).find(|entry| !entry.can_fit(&file)) {
-        let reason = format!("tag {} has {} values, more than the file has bytes", entry.tag, entry.count);
-        return Err(PictureError::DamagedImage { format: "TIFF", reason });
+    if let Some(first) = file.first_page().and_then(|at| file.page(at)) {
+        first.check_values(&file)?;
     }
     let Some(pages) = file.pages() else { return Ok(whole) };
     let unsupported = |found: String, remedy| PictureError::UnsupportedKind { format: "TIFF", found, remedy };
@@ -80,6 +78,7 @@ pub(crate) fn full_page(bytes: &[u8]) -> Result<FullPage<'_>, PictureError> {
     let (page, further) = (full.next(), full.count());
     // Without a full-size page, the first page is used.
     let Some(page) = page.or(pages.first()) else { return Ok(whole) };
+    page.check_values(&file)?;
     if further > 0 {
         let found = format!("{} full-size pages, none of which is marked as the picture", further + 1);
         return Err(unsupported(found, "save the page in a separate file"));
@@ -228,6 +227,13 @@ impl<'a> File<'a> {
 }
 
 impl Page {
+    /// Checks that the values of each tag that the decoder reads can be in the file.
+    fn check_values(&self, file: &File<'_>) -> Result<(), PictureError> {
+        let Some(entry) = self.entries.iter().find(|entry| !entry.can_fit(file)) else { return Ok(()) };
+        let reason = format!("tag {} has {} values, more than the file has bytes", entry.tag, entry.count);
+        Err(PictureError::DamagedImage { format: "TIFF", reason })
+    }
+
     fn entry(&self, tag: u16) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.tag == tag)
     }
@@ -459,6 +465,31 @@ mod tests {
             File::new(&bytes).unwrap().pages().map(|pages| pages.len())
         };
         assert_eq!((own(most), own(most + 1)), (Some(1), None));
+    }
+
+    #[test]
+    fn a_tag_with_more_values_than_the_file_has_bytes_is_refused_in_each_page() {
+        let pages = [rgb([4, 3], [9, 9, 9], REDUCED as u16), rgb([8, 6], [5, 5, 5], 0)];
+        let whole = file(&pages, false);
+        assert_eq!(decoded(&whole).unwrap().dimensions(), (8, 6));
+        let pages: Vec<u64> = File::new(&whole).unwrap().pages().unwrap().iter().map(|page| page.at).collect();
+        for at in pages {
+            // The number of values of the page's first tag follows the tag and the kind of its values.
+            let count_at = at as usize + 2 + 4;
+            let mut damaged = whole.clone();
+            damaged[count_at..count_at + 4].copy_from_slice(&100_000_000u32.to_le_bytes());
+            let told = decoded(&damaged).unwrap_err().to_string();
+            assert!(told.contains("has 100000000 values, more than the file has bytes"), "{told}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_32_bits_are_unsupported_and_not_damaged() {
+        // One channel of floating-point numbers: sample format 3.
+        let tags = vec![(BITS_PER_SAMPLE, vec![32]), (339, vec![3])];
+        let page = TestPage { size: [4, 3], samples: vec![0; 4 * 4 * 3], is_gray: true, tags };
+        let told = decoded(&file(&[page], false)).unwrap_err().to_string();
+        assert!(told.starts_with("unsupported kind of TIFF image: ") && told.contains("8 bits per channel"), "{told}");
     }
 
     #[test]

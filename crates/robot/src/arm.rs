@@ -65,7 +65,7 @@ pub trait Arm {
     /// Errors reported by the arm.
     fn set_load(&mut self, load: Load) -> Result<(), RobotError>;
 
-    /// Stops arm and hand at once.
+    /// Stops arm and hand at once. A hand at rest keeps holding its part.
     ///
     /// # Errors
     /// Errors reported by the arm.

@@ -23,6 +23,9 @@ pub enum RobotError {
     /// No path leads around the obstacles of the cell.
     #[error("no path through the cell: {0}")]
     NoWay(#[from] PlanError),
+    /// An obstacle of the cell blocks the straight motion up.
+    #[error("the motion was not started: {:.0} % of the straight path up can be followed: {why}", .share * 100.0)]
+    BlockedAbove { share: f64, why: String },
     /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
@@ -87,6 +90,7 @@ impl RobotError {
             Self::Unsafe(_)
                 | Self::Planning(_)
                 | Self::NoWay(_)
+                | Self::BlockedAbove { .. }
                 | Self::Latched(_)
                 | Self::Unreachable { .. }
                 | Self::Perception(_)

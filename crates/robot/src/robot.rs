@@ -35,7 +35,7 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
-    /// The load of the hand that was set last.
+    /// The load of the hand with which motions are planned.
     load: Load,
     /// The last compliant descent, of this program or an earlier one, until the next motion has ended without an error.
     felt_below: Option<FeltBelow>,
@@ -79,7 +79,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// As for [`Arm::state`].
     pub fn state(&mut self) -> Result<ArmState> {
         let state = self.arm.state();
-        self.note(state)
+        self.note_between_motions(state)
     }
 
     /// The controller's reference, rad: the start of the next motion.
@@ -128,13 +128,12 @@ impl<'a, A: Arm> Robot<'a, A> {
         })
     }
 
-    /// The straight motion up by `up_m` of an arm that is lower than the limits allow, after a program ended during a
-    /// compliant descent; `None` for an arm within the limits. [`Self::follow`] then allows this motion.
-    ///
-    /// # Errors
-    /// [`RobotError::Unsafe`] if the arm is more than 10 mm lower than the limits allow; [`RobotError::Planning`], and
-    /// the errors of [`Self::commanded`].
-    pub fn plan_ascent(&mut self, up_m: f64, cartesian: &CartesianLimits) -> Result<Option<Trajectory>> {
+    /// As [`Self::plan_ascent`], without a comparison with obstacles.
+    pub(crate) fn plan_ascent_within_limits(
+        &mut self,
+        up_m: f64,
+        cartesian: &CartesianLimits,
+    ) -> Result<Option<Trajectory>> {
         let start = self.commanded()?;
         let base_from_tcp = self.geometry().forward(&start);
         let tcp = base_from_tcp.translation.vector;
@@ -223,7 +222,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     pub fn start_hand(&mut self, command: HandCommand) -> Result<()> {
         self.ready()?;
         let started = self.arm.start_hand(command);
-        self.note(started)
+        self.note_between_motions(started)
     }
 
     /// Waits for the hand.
@@ -242,7 +241,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// As for [`Arm::hand`].
     pub fn hand(&mut self) -> Result<HandState> {
         let hand = self.arm.hand();
-        self.note(hand)
+        self.note_between_motions(hand)
     }
 
     /// As [`Arm::set_contact_sensitivity`].
@@ -251,7 +250,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Errors reported by the arm.
     pub fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<()> {
         let set = self.arm.set_contact_sensitivity(sensitivity);
-        self.note(set)
+        self.note_between_motions(set)
     }
 
     /// As [`Arm::set_load`].
@@ -260,9 +259,14 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// Errors reported by the arm.
     pub fn set_load(&mut self, load: Load) -> Result<()> {
         let set = self.arm.set_load(load);
-        self.note(set)?;
+        self.note_between_motions(set)?;
         self.load = load;
         Ok(())
+    }
+
+    /// Plans further motions with this load of the hand, which the arm does not get yet: see [`Self::set_load`].
+    pub fn plan_with_load(&mut self, load: Load) {
+        self.load = load;
     }
 
     /// Recovers the arm and allows motions again, after a person has checked it.
@@ -281,12 +285,31 @@ impl<'a, A: Arm> Robot<'a, A> {
             return Err(RobotError::Latched(why.clone()));
         }
         if let Some(reason) = self.watch.is_stop_requested() {
-            return self.note(Err(RobotError::Stopped(reason)));
+            return self.note_between_motions(Err(RobotError::Stopped(reason)));
         }
         let state = self.state()?;
         match state.mode {
             ArmMode::Idle | ArmMode::Moving => Ok(state),
-            mode => Err(RobotError::in_mode(mode)),
+            mode => Err(self.with_hand_stopped(RobotError::in_mode(mode))),
+        }
+    }
+
+    /// As [`Self::note`], for an error while the arm is at rest. The arm's own motions stop the fingers after an error;
+    /// here fingers that were started before may still move.
+    fn note_between_motions<T>(&mut self, result: Result<T>) -> Result<T> {
+        let result = match result {
+            Err(error) if error.latches() && self.latched.is_none() => Err(self.with_hand_stopped(error)),
+            result => result,
+        };
+        self.note(result)
+    }
+
+    /// Stops moving fingers after an error; the error says if that fails.
+    fn with_hand_stopped(&mut self, error: RobotError) -> RobotError {
+        match (error, self.arm.stop()) {
+            // A lost arm cannot be stopped; its own control does that.
+            (error @ RobotError::Lost { .. }, _) | (error, Ok(())) => error,
+            (error, Err(not_stopped)) => RobotError::Device(format!("{error}; {not_stopped}").into()),
         }
     }
 

@@ -1,9 +1,9 @@
 //! Motions around the obstacles of the cell.
 
 use nalgebra::{Isometry3, Point3};
-use sdg_kinematics::collision::{Body, Capsule, CollisionError, CollisionModel, Obstacle, Shape};
-use sdg_kinematics::planning::{Plan, PlanError, PlanOptions, StraightApproach};
-use sdg_kinematics::{ArmGeometry, JointLimits, JointPath, JointVector, NUM_JOINTS, Trajectory};
+use sdg_kinematics::collision::{Body, Capsule, Checker, CollisionError, CollisionModel, Obstacle, Shape};
+use sdg_kinematics::planning::{CheckedLine, Plan, PlanError, PlanOptions, StraightApproach, checked_line};
+use sdg_kinematics::{ArmGeometry, CartesianLimits, JointLimits, JointPath, JointVector, NUM_JOINTS, Trajectory};
 
 use crate::arm::Arm;
 use crate::error::{Result, RobotError};
@@ -12,6 +12,8 @@ use crate::robot::Robot;
 
 /// The table's name among the obstacles.
 pub(crate) const TABLE: &str = "table";
+/// Minimum distance from the obstacles of the cell on straight motions, m.
+pub(crate) const LINE_MARGIN_M: f64 = 0.003;
 /// Maximum number of searches: a path may violate a limit that the planner does not know, mainly the workspace.
 const NUM_SEEDS: u64 = 5;
 /// Maximum number of collision checks of a search: about one second, and ten times as many as difficult paths need.
@@ -21,6 +23,9 @@ const MAX_CHECKS: usize = 50_000;
 const START_ROOM_M: f64 = 0.002;
 /// Extent of the hand's capsules below the tcp while the hand points down, m.
 const HAND_BELOW_TCP_M: f64 = 0.010;
+/// Distance that obstacles nearer than this at the start of a straight motion up may keep, m: it becomes at most
+/// [`START_ROOM_M`] smaller.
+pub(crate) const NEAR_AT_START_M: f64 = LINE_MARGIN_M + START_ROOM_M;
 /// The obstacle under a surface contains the point this far below the surface, m.
 const BELOW_SUPPORT_M: f64 = 0.001;
 /// The obstacle under a surface does not contain the point this far above the surface, m: a solid around the surface is
@@ -68,7 +73,8 @@ pub struct Surroundings<'a> {
     pub held: &'a [Capsule],
     /// Whether obstacles may be nearer to `held` at the start of a free motion than the planner allows, because only the
     /// largest extent of the part is known. Such an obstacle does not touch the part, and must not prevent the motion
-    /// away from it; the part gets at most 5 mm nearer to it than at the start.
+    /// away from it; the part gets at most 5 mm nearer to it than at the start. On straight paths this applies to the
+    /// hand, which may be lower than planned after a contact; it gets at most 2 mm nearer.
     pub may_start_near: bool,
     /// Opening of the hand on straight paths, m; on free motions the hand is assumed to be fully open.
     pub opening_m: f64,
@@ -230,6 +236,35 @@ impl<A: Arm> Robot<'_, A> {
             }
         }
         Err(refused.map_or_else(|| PlanError::NoGoal.into(), RobotError::Unsafe))
+    }
+
+    /// The straight motion up by `up_m` of an arm that is lower than the limits allow, after a program ended during a
+    /// compliant descent; `None` for an arm within the limits. [`Robot::follow`] then allows this motion. Obstacles may
+    /// be near arm and held part at the start; the motion brings them at most 2 mm nearer.
+    ///
+    /// # Errors
+    /// [`RobotError::Unsafe`] if the arm is more than 10 mm lower than the limits allow;
+    /// [`RobotError::BlockedAbove`]; [`RobotError::Planning`]; [`RobotError::Device`] for invalid obstacles; the errors
+    /// of [`Robot::commanded`].
+    pub fn plan_ascent(
+        &mut self,
+        surroundings: &Surroundings<'_>,
+        up_m: f64,
+        cartesian: &CartesianLimits,
+    ) -> Result<Option<Trajectory>> {
+        let Some(motion) = self.plan_ascent_within_limits(up_m, cartesian)? else { return Ok(None) };
+        let (arm, start) = (self.geometry(), motion.start());
+        let mut model = surroundings.model(arm, self.limits().table_height_m)?;
+        for body in (1..=NUM_JOINTS).map(Body::link).chain([Body::HAND, Body::HELD_PART]) {
+            model.allow_overlaps_at(body, start, NEAR_AT_START_M);
+        }
+        let mut checker = Checker::new(&model, LINE_MARGIN_M);
+        let CheckedLine { share, path, blocked_by } =
+            checked_line(arm, &mut checker, start, &arm.forward(motion.end()))?;
+        match path {
+            Some(_) => Ok(Some(motion)),
+            None => Err(RobotError::BlockedAbove { share, why: blocked_by.unwrap_or_default() }),
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use sdg_robot::{
     Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, Pace, PartFinder, PlannedArm, Robot,
     RobotError, StepObserver, StopReason, Watch,
 };
-use sdg_ros2::dds::TrajectoryArm;
+use sdg_ros2::dds::{TrajectoryArm, network_panic};
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
 
 use crate::camera_pose::CameraPoseReader;
@@ -124,7 +124,8 @@ impl Grasping {
         };
         let mut arm = self.arm.take().context("the arm is lost")?;
         arm.forget_reference();
-        let (settings, is_interrupted) = (Arc::clone(&self.settings), Arc::clone(&self.is_interrupted));
+        let settings = Arc::clone(&self.settings);
+        let watch = watch(&self.is_interrupted, &self.pictures.0);
         let mut finder = ModelFinder::new(model.clone(), camera, self.pictures.clone());
         if config.height.is_some() {
             finder = finder.with_heights(UNKNOWN_HEIGHTS_M);
@@ -134,7 +135,7 @@ impl Grasping {
             let (answer, latched) = if is_dry_run {
                 (planned(&settings, &config, &mut arm, &mut finder), None)
             } else {
-                grasped(&settings, &config, &mut arm, &mut finder, &is_interrupted)
+                grasped(&settings, &config, &mut arm, &mut finder, watch)
             };
             (arm, answer, latched)
         }));
@@ -167,9 +168,9 @@ fn grasped(
     config: &GraspConfig,
     arm: &mut TrajectoryArm,
     finder: &mut ModelFinder<TopicPictures>,
-    is_interrupted: &IsInterrupted,
+    watch: Watch,
 ) -> (GraspResponse, Option<String>) {
-    let mut robot = Robot::new(arm, settings.workcell.safety_limits(), watch(is_interrupted));
+    let mut robot = Robot::new(arm, settings.workcell.safety_limits(), watch);
     let mut step = LastStep(GraspStep::Detect);
     let ended = sdg_robot::grasp(&mut robot, finder, &mut step, settings.camera.pose, config);
     let latched = robot.latched().map(str::to_owned);
@@ -196,10 +197,16 @@ fn grasped(
     (answer, latched)
 }
 
-/// A watch that stops the arm when the node must end.
-fn watch(is_interrupted: &IsInterrupted) -> Watch {
-    let is_interrupted = Arc::clone(is_interrupted);
-    Watch::new(Box::new(move || is_interrupted().then_some(StopReason::Interrupted)))
+/// A watch that stops the arm when the node must end: at a person's request, or because messages no longer arrive.
+fn watch(is_interrupted: &IsInterrupted, pictures: &Arc<Shared>) -> Watch {
+    let (is_interrupted, pictures) = (Arc::clone(is_interrupted), Arc::clone(pictures));
+    Watch::new(Box::new(move || {
+        if is_interrupted() {
+            return Some(StopReason::Interrupted);
+        }
+        let why = pictures.ended.get().map(ToString::to_string);
+        why.or_else(|| network_panic().map(|error| error.to_string())).map(StopReason::Watchdog)
+    }))
 }
 
 /// Plans the grasp without moving, from the arm's current posture.
@@ -242,4 +249,30 @@ fn pose(settings: &GraspInputs, target: Option<&GraspTarget>) -> PoseStamped {
     let header = Header { stamp: Time::from_system(SystemTime::now()), frame_id: settings.base_frame.clone() };
     let pose = target.map(|target| target.base_from_tcp.into()).unwrap_or_default();
     PoseStamped { header, pose }
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_ros2::RosError;
+    use sdg_ros2::dds::{network_thread, watch_network_threads};
+
+    use super::*;
+
+    #[test]
+    fn the_arm_stops_when_messages_no_longer_arrive() {
+        let reason = |is_interrupted: bool, pictures: &Arc<Shared>| {
+            let is_interrupted: IsInterrupted = Arc::new(move || is_interrupted);
+            watch(&is_interrupted, pictures).is_stop_requested()
+        };
+        let pictures = Arc::new(Shared::new(1));
+        assert_eq!(reason(false, &pictures), None);
+        assert_eq!(reason(true, &pictures), Some(StopReason::Interrupted));
+        let ended = Arc::new(Shared::new(1));
+        ended.ended.set(RosError::Network { what: "image".to_owned(), why: "lost".to_owned() }).unwrap();
+        assert_eq!(reason(false, &ended), Some(StopReason::Watchdog("image: lost".to_owned())));
+        watch_network_threads();
+        network_thread("images", || panic!("a test's panic")).unwrap().join().unwrap_err();
+        let Some(StopReason::Watchdog(why)) = reason(false, &pictures) else { panic!("no reason to stop") };
+        assert!(why.contains("ended by a panic"), "{why}");
+    }
 }

@@ -69,7 +69,11 @@ pub fn run(
     let (teach, trigger) = (settings.teach, settings.trigger_teaching);
     let mut services = Services::open(&mut node, teach, trigger, needs_lengths, grasping, &lines)?;
     let mut searcher = Searcher::new(settings.model, settings.min_score, needs_lengths);
-    eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
+    sdg_files::print_stderr(format_args!(
+        "sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it\n",
+        reader.topic,
+        topics.names()
+    ));
     while !is_interrupted() && reader.shared.ended.get().is_none() && network_panic().is_none() {
         if let Some(picture) = reader.shared.next(POLL_INTERVAL) {
             let over_table = camera_pose.at(&picture.header).map_err(anyhow::Error::from);

@@ -17,7 +17,7 @@ impl Lines {
     /// Prints a message if it is due; messages that differ only in numbers count as the same.
     pub(super) fn complain(&self, text: &str) {
         if let Some(line) = self.line(text, Instant::now()) {
-            eprintln!("sdg ros2: {line}");
+            sdg_files::print_stderr(format_args!("sdg ros2: {line}\n"));
         }
     }
 

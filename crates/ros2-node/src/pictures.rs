@@ -53,6 +53,17 @@ pub(super) struct Shared {
 }
 
 impl Shared {
+    pub(super) fn new(queue: usize) -> Self {
+        Self {
+            kept: Mutex::default(),
+            changed: Condvar::new(),
+            is_stopped: AtomicBool::new(false),
+            queue,
+            counts: Counts::default(),
+            ended: OnceLock::new(),
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -117,14 +128,7 @@ impl PictureReader {
         lines: &Arc<Lines>,
         read: fn(&T) -> (Header, Result<RgbImage, PictureError>),
     ) -> Result<Self, RosError> {
-        let shared = Arc::new(Shared {
-            kept: Mutex::default(),
-            changed: Condvar::new(),
-            is_stopped: AtomicBool::new(false),
-            queue,
-            counts: Counts::default(),
-            ended: OnceLock::new(),
-        });
+        let shared = Arc::new(Shared::new(queue));
         let topic = subscription.topic().to_owned();
         let (writer, lines) = (Arc::clone(&shared), Arc::clone(lines));
         let receive = move || {

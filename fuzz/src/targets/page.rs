@@ -9,8 +9,8 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use sdg_annotate::{
-    GraspTeacher, Live, LiveFrame, LiveOptions, LivePictures, RecentProjects, Region, Server, Session, SessionOptions,
-    Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
+    GraspTeacher, Live, LiveFrame, LiveOptions, LivePictures, RecentProjects, Region, Searched, Server, Session,
+    SessionOptions, Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_demonstration::{Demonstration, PixelFrame};
 
@@ -310,7 +310,7 @@ impl GraspTeacher for Unwilling {
         Ok(())
     }
 
-    fn open(&self, _: &[u8], _: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
+    fn open(&self, _: &[u8], _: &TaughtSummary, _: Option<Searched>) -> Result<Box<dyn TaughtModel>, TeacherError> {
         Err(REFUSED.into())
     }
 }

@@ -12,9 +12,9 @@ use crate::target::Target;
 /// A small limit, because a wrong size in a header must take neither much memory nor much time: with a million pixels a
 /// million executions took hours. The program's own limit is 210 megapixels.
 const LIMITS: ImageLimits = ImageLimits { max_pixels: 128 * 128 };
-/// A decoder holds a picture twice, in 16 bits with alpha, and its own tables. A JPEG inside a TIFF may have sides that
-/// differ from the page's.
-const MAX_EXTRA_BYTES: usize = 16 << 20;
+/// A decoder holds a picture twice, in 16 bits with alpha, and its own tables, and WebP's a chunk of up to 16 MiB. A JPEG
+/// inside a TIFF may have sides that differ from the page's.
+const MAX_EXTRA_BYTES: usize = 24 << 20;
 
 /// A small picture of many colours.
 pub(super) fn picture() -> RgbImage {

@@ -26,7 +26,7 @@
 //! | `POST /api/trial-pictures?name=` | adds a picture to try |
 //! | `GET /api/trial-pictures/{id}/picture` | a picture to try |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in the picture |
-//! | `POST /api/trial-pictures/{id}/accept` | makes the picture a demonstration with its own marks or, without any, the given ones |
+//! | `POST /api/trial-pictures/{id}/accept` | makes the picture a demonstration with its own marks or, if only these have a grasp, the given ones |
 //! | `POST /api/trial-pictures/{id}/would-help` | best scores of model S in other pictures, if the picture were a photo of the part |
 //! | `PUT /api/trial-pictures/{id}/absent` | states that the part is not in the picture, or revokes the statement |
 //! | `PUT /api/models/{id}/current` | uses a version of the model from `GET /api/session` |

@@ -11,9 +11,8 @@ use crate::model_versions::ModelVersions;
 use crate::names::{absolute, free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
-use crate::project_file::{
-    Gone, MAX_TRIAL_PICTURES, ProjectFile, ProjectPlace, Searched, TRIED_FOLDER, names_in_project,
-};
+use crate::project_file::{Gone, MAX_TRIAL_PICTURES, ProjectFile, ProjectPlace, TRIED_FOLDER, names_in_project};
+use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -96,24 +95,21 @@ impl Session {
             current: project.current_model,
         };
         let teaching = Arc::new(Teaching::default());
-        let mut region = match project.searched {
-            Some(Searched::Part(region)) => Some(region),
-            Some(Searched::All) | None => None,
-        };
+        let mut region = project.searched.and_then(Searched::region);
         let mut is_model_lost = false;
         if let Some(id) = models.current {
-            let opened = models
-                .read(id)
-                .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
+            let opened = models.read(id).and_then(|bytes| {
+                let open = |searched| teacher.open(&bytes, &models.versions[id].summary, searched);
+                // A region chosen on the page takes precedence over the model's file.
+                let opened = open(project.searched).or_else(|error| {
+                    let note = format!("The frame that is searched does not suit this model: {error}");
+                    open(None).inspect(|_| notes.push(note))
+                });
+                opened.map_err(Error::Teacher)
+            });
             match opened {
                 Ok(model) => {
-                    // A region chosen on the page takes precedence over the model's file.
-                    if project.searched.is_none() {
-                        region = model.region();
-                    } else if let Err(error) = model.look_in(region) {
-                        notes.push(format!("The frame that is searched does not suit this model: {error}"));
-                        region = model.region();
-                    }
+                    region = model.region();
                     teaching.set_model(Arc::from(model));
                 }
                 Err(error) => {

@@ -11,6 +11,7 @@ use crate::marks::Marks;
 use crate::names::{file_name, free_name};
 use crate::picture::{Picture, png};
 use crate::project_file::MAX_TRIAL_PICTURES;
+use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
 use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
@@ -123,7 +124,7 @@ impl Session {
     /// The detections of two model versions in every picture to try, in the current search region.
     ///
     /// # Errors
-    /// Unknown version, or a version's file cannot be read.
+    /// Unknown version, a version's file cannot be read, or a version cannot search the region.
     pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
         let (models, pictures, region) = {
             let state = self.state();
@@ -132,11 +133,10 @@ impl Session {
             let pictures: Vec<_> = state.trial_ids().map(tried).collect();
             ([read(one)?, read(other)?], pictures, state.region)
         };
-        let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
+        let searched = Some(Searched::of(region));
+        let [one, other] =
+            models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary, searched).map_err(Error::Teacher));
         let models = [one?, other?];
-        for model in &models {
-            model.look_in(region).map_err(Error::Teacher)?;
-        }
         let compare = |trial: &TrialPicture| {
             let pixels = trial.picture.pixels()?;
             let found = |model: &dyn TaughtModel| {
@@ -198,9 +198,9 @@ impl Session {
         pictures.into_iter().map(best_in).collect::<Result<_>>().map(Some)
     }
 
-    /// Makes a tried picture a demonstration with these marks, or with those in its file, which are not written over. A
-    /// picture from the page, or from another folder, is copied beside the first picture under an unused name: no marks
-    /// are written into other folders.
+    /// Makes a tried picture a demonstration with these marks, or with those that it has already, unless only the given
+    /// ones have a grasp. A picture from the page, or from another folder, is copied beside the first picture under an
+    /// unused name: no marks are written into other folders. If the photo that it became was removed, that is restored.
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
@@ -211,10 +211,12 @@ impl Session {
         if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
-        let mut picture = trial.picture;
+        let copy = trial.became.map(|id| state.images[id].picture.clone());
+        let is_copied = copy.is_some();
+        let mut picture = copy.unwrap_or(trial.picture);
         picture.check_is_markable()?;
         let folder_of = |path: &Path| std::path::absolute(path).ok()?.parent().map(Path::to_owned);
-        if trial.uploaded || folder_of(&picture.path) != folder_of(&self.home) {
+        if !is_copied && (trial.uploaded || folder_of(&picture.path) != folder_of(&self.home)) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;

@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use image::{Rgb, RgbImage};
 use sdg_annotate::{
-    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Region, Server, Session, SessionOptions,
-    Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
+    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, RecentProjects, Region, Searched, Server, Session,
+    SessionOptions, Start, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_demonstration::{Demonstration, PixelFrame};
 use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -90,9 +90,14 @@ impl GraspTeacher for InPlace {
         fits(region, &demonstrations[0])
     }
 
-    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
+    fn open(
+        &self,
+        bytes: &[u8],
+        summary: &TaughtSummary,
+        searched: Option<Searched>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
         if bytes == b"a model" {
-            Ok(Box::new(ReadModel(summary.clone(), Mutex::default())))
+            Ok(Box::new(ReadModel(summary.clone(), Mutex::new(searched.and_then(Searched::region)))))
         } else {
             Err("no model".into())
         }

@@ -99,7 +99,7 @@ fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Re
     }
     for (setting, control, value) in values {
         let written = device.write_control_raw(control, value);
-        written.map_err(|error| refused(setting, format!("that it rejects {value}: {error}")))?;
+        written.map_err(|error| refused(setting, format!("that it rejects {}: {error}", in_words(control, value))))?;
     }
     Ok(())
 }
@@ -120,6 +120,17 @@ fn requested_values(options: &OpenOptions) -> Vec<(&'static str, Cid, i32)> {
     values
 }
 
+/// A value of a control, with the unit of its option on the command line.
+fn in_words(control: Cid, value: i32) -> String {
+    if control == Cid::EXPOSURE_ABSOLUTE {
+        format!("{} ms", 1e3 * f64::from(value) / EXPOSURE_UNITS_PER_SEC)
+    } else if control == Cid::WHITE_BALANCE_TEMPERATURE {
+        format!("{value} K")
+    } else {
+        value.to_string()
+    }
+}
+
 /// Checks that the device has a control, and the value is in its range; the error says what was found.
 fn check_value(device: &Device, control: Cid, value: i32) -> Result<(), String> {
     let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
@@ -128,6 +139,7 @@ fn check_value(device: &Device, control: Cid, value: i32) -> Result<(), String> 
     if (min..=max).contains(&value) {
         return Ok(());
     }
+    let [min, max, value] = [min, max, value].map(|value| in_words(control, value));
     Err(format!("that {} goes from {min} to {max}, not to {value}", range.name()))
 }
 
@@ -209,6 +221,18 @@ impl Source for Stream {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    #[test]
+    fn values_have_the_unit_of_their_option() {
+        let exposure = OpenOptions { exposure_secs: Some(0.008), ..OpenOptions::default() };
+        let told = |options: &OpenOptions| -> Vec<String> {
+            requested_values(options).into_iter().map(|(_, control, value)| in_words(control, value)).collect()
+        };
+        assert_eq!(told(&exposure), ["1", "8 ms"]);
+        assert_eq!(in_words(Cid::EXPOSURE_ABSOLUTE, 3), "0.3 ms");
+        let white_balance = OpenOptions { white_balance_kelvin: Some(4600), ..OpenOptions::default() };
+        assert_eq!(told(&white_balance), ["0", "4600 K"]);
+    }
 
     #[test]
     fn what_is_no_node_is_refused_with_its_path() {

@@ -11,6 +11,7 @@ use serde_json::json;
 
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
+use crate::output_paths::prepare_new_folder;
 
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
@@ -23,7 +24,7 @@ pub struct AugmentArgs {
     /// Number of samples to write
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub count: u32,
-    /// Folder to write to; created if missing
+    /// Folder to write to, new or empty
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// The augmentation: edge (used in teaching), or paper (as in the paper)
@@ -63,16 +64,13 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
         Box::new(move |i| augmenter.sample(i))
     };
-    sdg_files::prepare_folder(&args.out)?;
-    let picture_name = |i: u64| format!("{i:06}.png");
-    let pictures = (0..u64::from(args.count)).map(picture_name);
-    sdg_files::check_are_no_inputs(pictures.chain([ANNOTATIONS.to_owned()]).map(|name| args.out.join(name)))?;
+    prepare_new_folder("--out", &args.out)?;
 
     let mut coco = CocoFile::new();
     let mut with_part = 0;
     for i in 0..u64::from(args.count) {
         let sample = sample(i);
-        let name = picture_name(i);
+        let name = format!("{i:06}.png");
         sdg_files::write_png(&args.out.join(&name), &sample.image)?;
 
         let instances = labels_of(&sample, &label);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use sdg_camera::{Address, LatestFrame, PixelFrame};
+use sdg_camera::{Address, LatestFrame, OpenOptions, PixelFrame};
 use sdg_cell::{Ended, GraspSettings, GraspTask, LivePictures, ModelFinder, Pictures};
 use sdg_grasp::GraspError;
 use sdg_inputs::camera_files;
@@ -15,7 +15,7 @@ use crate::clock;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::json_line::json_line;
+use crate::json_line::{json_line, tell};
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{self, Consent, RobotChoice, confirm, draw_dry_run, print_plan, write_states};
 use crate::shared_args::{ComputeArgs, ToldHeightArgs};
@@ -85,6 +85,9 @@ pub struct GraspArgs {
 pub fn run(args: &GraspArgs) -> Result<Outcome> {
     let task = prepare(args)?;
     let choice = RobotChoice::named(args.robot.as_ref(), task.workcell.address.as_deref())?;
+    let [width, height] = task.camera.size_px();
+    args.request.check_size([width, height], "of the calibration")?;
+    let options = OpenOptions { width, height, frame: PixelFrame::Sensor, ..args.request.options(&args.from)? };
     let interrupt = Interrupt::watch();
     // An output path that is not a folder is reported before anything moves; the folder is created when there is
     // something to write.
@@ -94,9 +97,6 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
     match choice {
         RobotChoice::Sim => simulated(args, &task, &interrupt),
         RobotChoice::Network(address) => {
-            let mut options = args.request.options();
-            [options.width, options.height] = task.camera.size_px();
-            options.frame = PixelFrame::Sensor;
             let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
             arm.check_model(task.workcell.robot)?;
@@ -169,7 +169,7 @@ fn simulated(args: &GraspArgs, task: &GraspTask, interrupt: &Interrupt) -> Resul
         let path = args.out.join("grasp.png");
         let render = RenderConfig { width: 800, height: 600, ..RenderConfig::default() };
         sdg_files::write_png(&path, &cell.scene_image(render)?)?;
-        eprintln!("the cell after the grasp: {}", path.display());
+        tell(args.json, &format!("the cell after the grasp: {}", path.display()));
     }
     Ok(outcome.unwrap_or(Outcome::Done))
 }
@@ -206,6 +206,9 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         };
         if confirm(&question, args.yes)? == Consent::Refused {
             eprintln!("nothing was moved");
+            if args.json {
+                println!("{}", json_line(&task.refused_record(address.unwrap_or("sim"), clock::elapsed_secs()))?);
+            }
             return Ok(None);
         }
     }
@@ -237,15 +240,15 @@ fn dry_run<A: Arm, P: Pictures<A>>(
     finder: &ModelFinder<P>,
 ) -> Result<()> {
     let plan = task.plan(arm, limits, target, PartFinder::<A>::others(finder))?;
-    eprintln!("planned, not executed:");
-    print_plan(&plan)?;
+    tell(args.json, "planned, not executed:");
+    print_plan(&plan, args.json)?;
     #[cfg(feature = "simulation")]
     if let Err(missing) = sdg_simulation::load() {
         eprintln!("no motion is drawn: {missing}");
         return Ok(());
     }
     for file in draw_dry_run(&plan, &args.out, finder.seen().filter(|_| target.is_some()), &task.workcell)? {
-        eprintln!("  {}", file.display());
+        tell(args.json, &format!("  {}", file.display()));
     }
     Ok(())
 }
@@ -259,7 +262,7 @@ fn print_report(args: &GraspArgs, task: &GraspTask, ended: &Ended, secs: f64, ro
     if let Some(height) = grasp.height.as_ref().and_then(|height| height.settled) {
         let height_mm = 1e3 * (height.height_m - task.workcell.table_height_m);
         let (sigma_mm, source) = (1e3 * height.sigma_m, height.source.name());
-        eprintln!("its marks are {height_mm:.1} ± {sigma_mm:.1} mm above the table, as {source}");
+        tell(args.json, &format!("its marks are {height_mm:.1} ± {sigma_mm:.1} mm above the table, as {source}"));
     }
     let total_secs = clock::elapsed_secs();
     let took = match robot {
@@ -271,7 +274,7 @@ fn print_report(args: &GraspArgs, task: &GraspTask, ended: &Ended, secs: f64, ro
             let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
             // A simulated arm exists only as long as the program.
             let then = if robot == "sim" { "" } else { "; sdg robot open releases it" };
-            eprintln!("the part is held, {width_mm:.0} mm between the fingers ({took}){then}");
+            tell(args.json, &format!("the part is held, {width_mm:.0} mm between the fingers ({took}){then}"));
             Ok(Outcome::Done)
         }
         (None, Some((goal, _))) => {
@@ -284,11 +287,11 @@ fn print_report(args: &GraspArgs, task: &GraspTask, ended: &Ended, secs: f64, ro
                     error.angle_rad.abs().to_degrees()
                 ),
             };
-            eprintln!("the part {where_it_lies} \"{}\" ({took})", goal.name);
+            tell(args.json, &format!("the part {where_it_lies} \"{}\" ({took})", goal.name));
             Ok(Outcome::Done)
         }
         (Some((_, why)), _) if ended.found_nothing() => {
-            eprintln!("{why}");
+            tell(args.json, why);
             Ok(Outcome::NothingToGrasp)
         }
         (Some((step, why)), _) => Err(anyhow!("{step}: {why}")),

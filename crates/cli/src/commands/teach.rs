@@ -1,7 +1,6 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
 use std::fmt::Display;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -13,7 +12,7 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_evaluation::{TaughtFile, quoted, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
+use sdg_grasp::{AcceptedNegative, CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights, first_names};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -53,7 +52,7 @@ pub struct TeachArgs {
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
     /// calibrated so that nothing is accepted in it, as long as nine in ten parts in held-out samples are still
-    /// accepted; repeat for several
+    /// accepted; else the picture does not change the score, and a warning names it. Repeat for several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write
@@ -219,6 +218,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     for warning in figures.warnings() {
         eprintln!("{} {warning}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
+    for AcceptedNegative { idx, score } in &taught.accepted_negatives {
+        let (warning, picture) = (Paint::stderr().text(Tone::Doubtful, "warning:"), args.negatives[*idx].display());
+        eprintln!("{warning} --negative {picture}: still accepted with {score:.2}: does it show the part?");
+    }
     for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
     }
@@ -260,10 +263,11 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             println!("searches {region} of pictures of the photo's size");
         }
         if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
-            println!(
-                "refuses {refused} of {pictures} pictures without the part; for this, every score is lowered by {:.1} log-odds",
-                -log_odds
-            );
+            let lowered = match log_odds < 0.0 {
+                true => format!("; for this, every score is lowered by {:.1} log-odds", -log_odds),
+                false => String::new(),
+            };
+            println!("refuses {refused} of {pictures} pictures without the part{lowered}");
         }
         if let Some(lengths) = &facts.lengths {
             println!(
@@ -279,7 +283,11 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         if let Some(warning) = taught_words::too_wide(&taught.model) {
             eprintln!("{warning}");
         }
-        println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
+        let size = match bytes.len() {
+            small @ ..1_000_000 => format!("{:.0} kB", small as f64 / 1e3),
+            large => format!("{:.1} MB", large as f64 / 1e6),
+        };
+        println!("wrote {} ({size})", args.out.display());
         if let Some(path) = page {
             println!("report: {}", path.display());
         }
@@ -372,9 +380,8 @@ fn read_given_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Op
     let mut told = None;
     let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
         if !args.json {
-            let mut stdout = std::io::stdout().lock();
-            write!(stdout, "{}", report.exceptions())?;
-            writeln!(stdout, "base weights {} (names of {}): {}", path.display(), report.naming, report.summary())?;
+            print!("{}", report.exceptions());
+            println!("base weights {} (names of {}): {}", path.display(), report.naming, report.summary());
         }
         told = Some(report.clone());
         Ok(())

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use super::teach::{NO_BASE_WEIGHTS, TeachArgs, options, read_base_weights, symmetry};
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
+use crate::paint::{Paint, Tone};
 use crate::progress::EvaluationProgress;
 
 /// Teaches the parts whose outcome for these inputs is not stored yet. Then, unless `--part` selects single parts, runs
@@ -59,15 +60,27 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
             let ([first, second], [there, back]) = (findings.names(pair), pair.scores);
             println!("look alike: {first} and {second} ({there:.2}, {back:.2})");
         }
-        for (name, why) in findings.need_photo.iter().chain(&findings.left_out) {
+        for (name, outcome) in &findings.parts {
+            if let PartOutcome::Failed { why } = outcome {
+                println!("not taught: {name}: {why}");
+            }
+        }
+        // Parts without a model are among them as well.
+        for (name, why) in findings.need_photo.iter().filter(|(name, _)| findings.taught.contains(name)) {
             println!("needs another photo: {name}: {why}");
+        }
+        for (photo, why) in &findings.left_out {
+            println!("left out: {photo}: {why}");
         }
         println!("report: {}", report.display());
     }
     if findings.taught.is_empty() {
         bail!("{}: expected a part that can be taught, found none; the page has the reasons", folder.display());
     }
-    Ok(Outcome::Done)
+    let is_usable =
+        |outcome: &PartOutcome| matches!(outcome, PartOutcome::Taught { .. }) && outcome.failure().is_none();
+    let are_all_usable = findings.parts.iter().all(|(_, outcome)| is_usable(outcome));
+    Ok(if are_all_usable { Outcome::Done } else { Outcome::ModelFails })
 }
 
 /// The parts selected by `--part`, or all parts.
@@ -85,19 +98,25 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`.
+/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`; if a
+/// model fails its held-out samples, the outcome is that of a single part.
 fn told(args: &TeachArgs, outcomes: PartOutcomes) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =
             outcomes.iter().map(|(name, outcome)| json!({ "name": name, "outcome": outcome })).collect();
         println!("{}", json!({ "parts": parts }));
     }
+    let mut result = Outcome::Done;
     for (name, outcome) in outcomes {
+        if let Some(failure) = outcome.failure() {
+            eprintln!("{} {name}: {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
+            result = Outcome::ModelFails;
+        }
         if let PartOutcome::Failed { why } = outcome {
             bail!("{name}: {why}");
         }
     }
-    Ok(Outcome::Done)
+    Ok(result)
 }
 
 /// The command that makes the same page again.

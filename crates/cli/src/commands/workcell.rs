@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use sdg_cell::{Reach, WorkcellMap};
 
 use crate::exit::Outcome;
+use crate::output_paths::check_ending;
 
 /// The commands of `sdg workcell`.
 #[derive(Debug, Subcommand)]
@@ -28,7 +29,7 @@ pub struct ShowArgs {
     /// Size of a square of the map of reach
     #[arg(long, value_name = "MM", default_value_t = 25.0)]
     pub grid_mm: f64,
-    /// The picture to write
+    /// The PNG file to write
     #[arg(long, value_name = "FILE", default_value = "workcell.png")]
     pub out: PathBuf,
 }
@@ -44,14 +45,15 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
             return Err(crate::exit::Usage(why).into());
         }
     }
+    check_ending("--out", &args.out, "png")?;
     let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     sdg_files::check_writable(&args.out)?;
     let map = WorkcellMap::around(&workcell);
     let reach = Reach::of(&workcell, map.area_m(), args.grid_mm * 1e-3, args.height_mm * 1e-3)?;
     for line in reach.lines(&workcell) {
-        eprintln!("{line}");
+        println!("{line}");
     }
     sdg_files::write_drawing(&args.out, &map.draw(&workcell, &reach))?;
-    eprintln!("{}", args.out.display());
+    println!("{}", args.out.display());
     Ok(Outcome::Done)
 }

@@ -4,6 +4,8 @@ use std::io::{BufRead, IsTerminal, Write};
 
 use anyhow::{Context, Result};
 
+use crate::interrupt::while_asking;
+
 /// The person's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Consent {
@@ -27,7 +29,7 @@ pub(crate) fn confirm(question: &str, is_yes: bool) -> Result<Consent> {
     }
     eprint!("{question} [y/N] ");
     std::io::stderr().flush().context("standard error")?;
-    answer(&mut stdin.lock())
+    while_asking(|| answer(&mut stdin.lock()))
 }
 
 fn answer(input: &mut dyn BufRead) -> Result<Consent> {

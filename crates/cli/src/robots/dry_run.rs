@@ -3,19 +3,22 @@
 use anyhow::{Result, anyhow};
 use sdg_cell::DryRun;
 
-/// Prints one line for each motion, and the end of the plan.
+use crate::json_line::tell;
+
+/// Prints one line for each motion, and the end of the plan; `is_json` as for [`tell`].
 ///
 /// # Errors
 /// A step cannot be planned.
-pub(crate) fn print_plan(plan: &DryRun) -> Result<()> {
+pub(crate) fn print_plan(plan: &DryRun, is_json: bool) -> Result<()> {
     for line in plan.lines() {
-        eprintln!("  {line}");
+        tell(is_json, &format!("  {line}"));
     }
     match &plan.failed {
-        None => eprintln!("  {:.0} s in all", plan.arm.duration_secs()),
+        None => tell(is_json, &format!("  {:.0} s in all", plan.arm.duration_secs())),
         Some(_) if plan.found_nothing => {
-            eprintln!(
-                "  the part is not visible from the arm's current posture: only the way to the look-out poses is planned"
+            tell(
+                is_json,
+                "  the part is not visible from the arm's current posture: only the way to the look-out poses is planned",
             );
         }
         Some((step, why)) => return Err(anyhow!("{step}: {why}")),
@@ -60,8 +63,8 @@ mod tests {
 
     #[test]
     fn a_refused_motion_to_the_first_look_out_pose_is_an_error() {
-        print_plan(&unseen_from(0.30)).unwrap();
-        let error = print_plan(&unseen_from(0.02)).unwrap_err().to_string();
+        print_plan(&unseen_from(0.30), false).unwrap();
+        let error = print_plan(&unseen_from(0.02), false).unwrap_err().to_string();
         assert!(error.starts_with("detect: the path there passes "), "{error}");
     }
 }

@@ -9,6 +9,8 @@ use sdg_webdriver::{Browser, BrowserOptions};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use crate::support::assert_fields_are_documented;
+
 /// The pendulum's box on its photo: left, top, right, bottom.
 pub const BOX: [f64; 4] = [255.0, 164.0, 392.0, 282.0];
 /// The grasp point: the middle of the pendulum's handle.
@@ -198,6 +200,7 @@ fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
         .unwrap();
     let mut line = String::new();
     BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    assert_fields_are_documented(&["annotate", "--json"], line.as_bytes());
     let told: Value = serde_json::from_str(&line).unwrap();
     (server, told["url"].as_str().unwrap().to_owned())
 }

@@ -470,6 +470,40 @@ fn marks_kept_by_another_tab_stay_until_they_are_saved() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn marks_kept_by_another_tab_that_have_arrived_are_removed() {
+    let page = open(&[], &["photo"]);
+    // As a tab that was closed while its last request was on the way.
+    let keep = "return import('/page/store.js').then(({ state }) => {
+            const [{ name, sent }] = state.images;
+            const was = JSON.parse(sent);
+            was.box[0] -= 5;
+            const entry = { was: JSON.stringify(was), marks: JSON.parse(sent) };
+            localStorage.setItem(`kept-marks:${state.project}`, JSON.stringify({ [name]: entry }));
+        })";
+    page.browser.run(keep, &[]).unwrap();
+    let is_removed = "return !Object.keys(localStorage).some((key) => key.startsWith('kept-marks:'))";
+    page.wait_for("the removal", is_removed);
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn pictures_are_searched_again_if_another_page_changes_the_region_before_a_teaching() {
+    let page = open(&[], &["photo"]);
+    // This page learns of both during the teaching, which then fails.
+    let change = "return import('/page/store.js').then(({ adoptModels, state }) => {
+            const { generation, models, region, teaching } = state;
+            state.teaching = { ...teaching, status: 'running' };
+            adoptModels({ models, region: { x: 0, y: 0, width: 9, height: 9, picture: null } });
+            state.teaching = teaching;
+            const isSearched = state.generation > generation;
+            adoptModels({ models, region });
+            return isSearched;
+        })";
+    assert_eq!(page.browser.run(change, &[]).unwrap(), json!(true));
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn kept_marks_are_sent_although_their_file_has_a_box_of_the_outline() {
     let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
     let draw = "return Promise.all(['store', 'editing'].map((name) => import(`/page/${name}.js`)))

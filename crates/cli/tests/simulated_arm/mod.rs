@@ -4,6 +4,14 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
+#[cfg(unix)]
+use std::time::{Duration, Instant};
+
+/// Maximum duration of the end of the program after a signal, far beyond that on a busy machine.
+#[cfg(unix)]
+const MAX_ENDING: Duration = Duration::from_secs(60);
+
+use crate::support::assert_fields_are_documented;
 
 static NUM_STARTED: AtomicU16 = AtomicU16::new(0);
 
@@ -35,6 +43,7 @@ impl Simulated {
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.contains(&port), "{line}");
+        assert_fields_are_documented(&["simulate", "--json"], line.as_bytes());
         Self { child, address: format!("127.0.0.1:{port}") }
     }
 
@@ -44,11 +53,18 @@ impl Simulated {
         assert!(sent.success());
     }
 
-    /// The exit code after a signal.
+    /// The exit code after a signal, which ends the program within [`MAX_ENDING`].
     #[cfg(unix)]
     pub fn interrupted(mut self, signal: &str) -> Option<i32> {
         self.signal(signal);
-        self.child.wait().unwrap().code()
+        let deadline = Instant::now() + MAX_ENDING;
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status.code();
+            }
+            assert!(Instant::now() < deadline, "{signal} did not end the program within {MAX_ENDING:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 }
 

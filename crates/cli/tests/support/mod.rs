@@ -4,6 +4,8 @@
 
 mod documented;
 
+pub use documented::assert_fields_are_documented;
+
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -11,13 +13,13 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use image::RgbImage;
+use image::{GrayImage, Luma, RgbImage};
 use sdg_demonstration::{Annotation, ImageFacts};
 
 /// Runs `sdg` and waits until it exits. Fields of the printed JSON that no document describes fail the test.
 pub fn sdg(arguments: &[impl AsRef<OsStr>]) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap();
-    documented::assert_fields_are_documented(arguments, &output.stdout);
+    assert_fields_are_documented(arguments, &output.stdout);
     output
 }
 
@@ -72,6 +74,20 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
         lock.write_all(made_of.as_bytes()).unwrap();
     }
     fs::copy(&model, out).unwrap();
+}
+
+/// Writes a photo and its marks, from which a model is taught that fails its own samples: a patch of a checkerboard,
+/// which occurs everywhere in the picture.
+pub fn write_unusable_demonstration(photo: &Path) {
+    let is_light = |x: u32, y: u32| (x / 40 + y / 40) % 2 == 0;
+    let checks = GrayImage::from_fn(640, 480, |x, y| Luma([if is_light(x, y) { 200 } else { 60 }]));
+    checks.save(photo).unwrap();
+    let marks = serde_json::json!({
+        "images": [{"id": 1, "file_name": "checks.png"}],
+        "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "bbox": [240, 160, 160, 160],
+                         "keypoints": [300, 240, 2, 340, 240, 2]}],
+        "categories": [{"id": 1, "name": "patch", "keypoints": ["grasp_start", "grasp_end"]}]});
+    fs::write(photo.with_extension("json"), marks.to_string()).unwrap();
 }
 
 /// The pendulum's photo with a second copy of the part, cut out along its marked outline and shifted by `[dx, dy]`

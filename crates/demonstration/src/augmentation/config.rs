@@ -171,7 +171,7 @@ impl AugmentationConfig {
 }
 
 /// Width and height of the samples of a photo if the settings give none: those of the photo, reduced if it is large.
-pub(crate) fn output_size_of(photo: [u32; 2]) -> [u32; 2] {
+pub fn output_size_of(photo: [u32; 2]) -> [u32; 2] {
     let is_large = pixels(photo) > MAX_OWN_PIXELS;
     sample_size(photo, if is_large { MAX_REDUCED_PIXELS } else { MAX_OWN_PIXELS })
 }

@@ -33,5 +33,5 @@ mod tests;
 mod warp;
 
 pub use augmenter::{Augmenter, Windows};
-pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle, sample_size};
+pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle, output_size_of, sample_size};
 pub use sample::{Sample, SampleObject};

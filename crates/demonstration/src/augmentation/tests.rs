@@ -267,9 +267,11 @@ fn settings_and_demonstrations_are_checked() {
         Augmenter::new(demonstrations, AugmentationConfig::default(), 1).err().unwrap().to_string()
     };
     assert!(refuse(&[]).contains("at least one"));
-    let mut banner = demonstration(true);
-    banner.image = RgbImage::new(30_000, 480);
-    assert!(refuse(&[banner]).contains("16 to 8192 pixels a side"));
+    for size in [[8193, 480], [640, 15]] {
+        let config = AugmentationConfig { output_size: Some(size), ..AugmentationConfig::default() };
+        let told = Augmenter::new(&[demonstration(true)], config, 1).err().unwrap().to_string();
+        assert!(told.contains("16 to 8192 pixels a side"), "{told}");
+    }
     let mut outside = demonstration(true);
     outside.annotation.grasp = Some(GraspLine::new(Point2::new(f64::NAN, 3.0), Point2::new(9.0, 9.0)));
     assert!(refuse(&[outside]).contains("grasp of `L`"));

@@ -33,29 +33,36 @@ pub struct LabelledFolder {
     pub left_out: Vec<LeftOut>,
     /// Number of instances with labels of other objects.
     pub others: usize,
+    /// The label of all instances, if it is not the model's object and none was given: they count as the part.
+    pub foreign_label: Option<String>,
 }
 
 impl LabelledFolder {
     /// Reads every label and checks it against its picture, before the detection, which takes long.
     ///
     /// With `label`, only instances with this label count. Otherwise, if there are several labels, only the model's
-    /// object counts. If there is a `truth.json`, no other label is read.
+    /// object counts; a single label counts even if it is not the model's object. If there is a `truth.json`, no other
+    /// label is read.
     ///
     /// # Errors
     /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the
     /// picture or for another picture size; two files label the same picture; an instance that is not optional has no
-    /// grasp; no instance has the given label; without a given label, there are several labels, and none is the model's
+    /// grasp; no instance has the given label, which is not the model's object either; without a given label, there are several labels, and none is the model's
     /// object; the model was taught from all pictures.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
-        let mut others = 0;
+        let (mut others, mut foreign_label) = (0, None);
         let read = if folder.join(TRUTH_FILE).exists() {
             read_truth(folder, detector, &mut left_out)?
         } else {
             let read = read_labels(folder, detector, &mut left_out)?;
             let label = chosen_label(folder, &read, detector.model(), label)?;
-            let all = read.iter().flat_map(|picture| &picture.instances);
-            others = all.filter(|instance| !is_counted(instance, label.as_deref())).count();
+            let all = || read.iter().flat_map(|picture| &picture.instances);
+            others = all().filter(|instance| !is_counted(instance, label.as_deref())).count();
+            if label.is_none() {
+                let mut labels = all().map(|instance| &instance.annotation.label);
+                foreign_label = labels.find(|label| *label != detector.model().object()).cloned();
+            }
             read.into_iter().map(|picture| picture.counted(label.as_deref())).collect::<Result<_>>()?
         };
         let mut pictures = Vec::new();
@@ -75,7 +82,7 @@ impl LabelledFolder {
             );
         }
         left_out.sort_by(|a, b| a.file.cmp(&b.file));
-        Ok(Self { pictures, left_out, others })
+        Ok(Self { pictures, left_out, others, foreign_label })
     }
 }
 
@@ -244,7 +251,7 @@ fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
 }
 
 /// The label that counts. `None` if no label is given and all instances have the same label, even if it is not the
-/// model's object.
+/// model's object. Pictures without instances of the model's object are pictures without the part.
 fn chosen_label(
     folder: &Path,
     pictures: &[ReadPicture],
@@ -255,7 +262,9 @@ fn chosen_label(
     let labels: BTreeSet<&str> = instances.map(|instance| instance.annotation.label.as_str()).collect();
     let listed = || labels.iter().copied().collect::<Vec<_>>().join(", ");
     match label {
-        Some(label) if labels.contains(label) || labels.is_empty() => Ok(Some(label.to_owned())),
+        Some(label) if labels.contains(label) || labels.is_empty() || label == model.object() => {
+            Ok(Some(label.to_owned()))
+        }
         Some(label) => bail!("{}: expected instances labelled {label}, found {}", folder.display(), listed()),
         None if labels.len() <= 1 => Ok(None),
         None if labels.contains(model.object()) => Ok(Some(model.object().to_owned())),

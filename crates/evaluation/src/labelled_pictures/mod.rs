@@ -29,7 +29,7 @@ pub use label_offset::{LabelOffset, label_offset};
 pub use page::{in_words, page};
 pub use picture::{Instance, LabelledPicture, LeftOut};
 pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
-pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
+pub use score::{Errors, HitError, Judged, Tested, Totals, Truth, by_kind, judge};
 pub use sdg_cell::DEFAULT_MIN_SCORE;
 pub use summary::summary;
 pub use testing::TestedFolder;

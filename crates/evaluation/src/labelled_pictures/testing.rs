@@ -33,7 +33,7 @@ impl LabelledFolder {
         min_score: f64,
         progress: &dyn Progress,
     ) -> Result<TestedFolder> {
-        let Self { pictures, mut left_out, others } = self;
+        let Self { pictures, mut left_out, others, .. } = self;
         progress.expect(pictures.len());
         let mut tested = Vec::with_capacity(pictures.len());
         for picture in pictures {

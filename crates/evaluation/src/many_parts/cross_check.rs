@@ -115,7 +115,8 @@ mod tests {
         let parts = ["key", "rod_end"].map(|name| {
             let files = vec![(shipped.join(name).join("image.png"), shipped.join(name).join("annotation.json"))];
             let part = PartDemonstrations { name: name.to_owned(), files, symmetry: None };
-            let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+            let mut options = TeachOptions::new(1);
+            options.kind = ModelKind::S;
             let taught = teach(&part.read().unwrap(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
             let outcome = PartOutcome::Failed { why: "not tested".to_owned() };
             let record = PartRecord { key: serde_json::Value::Null, outcome };

@@ -45,14 +45,16 @@ impl DemonstrationFolder {
         let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
         let mut left_out = Vec::new();
         let mut add = |name: String, photo: PathBuf, is_own_part: bool| -> Result<()> {
-            if let Some(why) = why_unreadable(&photo) {
-                left_out.push((photo.display().to_string(), why));
-                return Ok(());
-            }
-            let marks = match beside_photo(&photo) {
+            let marks = match why_unreadable(&photo) {
+                None => beside_photo(&photo).map_err(|error| error.to_string()),
+                Some(why) => Err(why),
+            };
+            let marks = match marks {
                 Ok(marks) => marks,
-                Err(error) => {
-                    left_out.push((photo.display().to_string(), error.to_string()));
+                Err(why) => {
+                    let name = photo.display().to_string();
+                    let why = why.strip_prefix(&format!("{name}: ")).unwrap_or(&why).to_owned();
+                    left_out.push((name, why));
                     return Ok(());
                 }
             };
@@ -207,7 +209,7 @@ mod tests {
         let read = DemonstrationFolder::read(folder.path(), |text| Err(text.to_owned())).unwrap();
         assert_eq!(read.parts.len(), 1);
         let [(name, why)] = read.left_out.as_slice() else { panic!("{:?}", read.left_out) };
-        assert!(name.ends_with("lever.heic") && why.contains("HEIC"), "{name}: {why}");
+        assert!(name.ends_with("lever.heic") && why.contains("HEIC") && !why.contains("lever.heic"), "{name}: {why}");
     }
 
     #[test]

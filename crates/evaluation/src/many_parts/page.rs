@@ -31,20 +31,24 @@ pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
         .key_figure(count(findings.need_photo.len(), "parts need another photo"));
     report = report.section(look_alikes(findings, photos));
     let section = Section::new("Another photo");
-    report = report.section(if findings.need_photo.is_empty() && findings.left_out.is_empty() {
+    let reasons = |of: &str, listed: &[(String, String)]| {
+        let table = Table::new(vec![Column::text(of), Column::text("why")]);
+        let row = |(name, why): &(String, String)| vec![Cell::text(name.clone()), Cell::text(why.clone())];
+        listed.iter().map(row).fold(table, Table::row)
+    };
+    report = report.section(if findings.need_photo.is_empty() {
         section.paragraph("No part needs one.")
     } else {
-        let mut table = Table::new(vec![Column::text("part"), Column::text("why")]);
-        for (name, why) in findings.need_photo.iter().chain(&findings.left_out) {
-            table = table.row(vec![Cell::text(name.clone()), Cell::text(why.clone())]);
-        }
         section
             .lead(
                 "Photograph the part under other light or in another place, on a plain background, and mark it as \
                    before.",
             )
-            .table(table)
+            .table(reasons("part", &findings.need_photo))
     });
+    if !findings.left_out.is_empty() {
+        report = report.section(Section::new("Photos left out").table(reasons("photo", &findings.left_out)));
+    }
     report
         .section(all_parts(findings, photos))
         .section(Section::new("This run").facts([("machine", machine())]).command(command))

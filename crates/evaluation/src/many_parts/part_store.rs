@@ -9,7 +9,8 @@ use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::held_back::HeldBackFigures;
+use crate::held_back::{HeldBackFigures, failure_of};
+use crate::statistics::Share;
 
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
@@ -67,6 +68,12 @@ impl PartOutcome {
             median: figures.median_errors(),
             turned_photos: figures.turned().iter().map(|turned| turned.photo).collect(),
         }
+    }
+
+    /// The reason why the model is unusable, by the rule of [`HeldBackFigures::failure`]; `None` without a model.
+    pub fn failure(&self) -> Option<String> {
+        let &Self::Taught { found, parts, false_alarms, without_part, .. } = self else { return None };
+        failure_of(Share { count: found, of: parts }, Share { count: false_alarms, of: without_part })
     }
 
     /// The outcome as a short text.

@@ -250,7 +250,7 @@ pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
     })
 }
 
-#[cfg(all(test, feature = "teach"))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::teach::tests::demonstration;

@@ -190,22 +190,24 @@ impl PlanViewDetector {
     /// Detections in a picture, in pixels of the plan view.
     pub(crate) fn find(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let size = self.view_size();
-        let (window, counts): (_, &dyn Fn(&GraspDetection) -> bool) = match &self.region {
-            None => (SearchWindow::whole(size), &|_| true),
+        let window = match &self.region {
+            None => SearchWindow::whole(size),
             Some(region) => {
                 region.region.check(picture.dimensions().into())?;
-                (region.window(size, self.model.demonstrations())?, &|detection| self.is_in_region(detection))
+                region.window(size, self.model.demonstrations())?
             }
+        };
+        let counts = |detection: &GraspDetection| {
+            let placed = self.placed(detection.clone());
+            placed.is_some_and(|placed| placed.detection.lies_within(self.region(), self.picture_size()))
         };
         read_sync(self.model.find_in(&self.window_of(picture, &window.rect), &window, verification, counts))
     }
 
-    /// Whether a detection in the plan view lies in the searched region of the picture; always true for whole pictures.
-    pub(crate) fn is_in_region(&self, detection: &GraspDetection) -> bool {
-        let has = |region: &RegionInPlanView| {
-            self.placed(detection.clone()).is_some_and(|placed| placed.detection.lies_in(&region.region))
-        };
-        self.region.as_ref().is_none_or(has)
+    /// Width and height of the camera's pictures.
+    pub(crate) fn picture_size(&self) -> [u32; 2] {
+        let intrinsics = self.over_table.camera.intrinsics;
+        [intrinsics.width, intrinsics.height]
     }
 
     /// Width and height of the plan view.
@@ -289,8 +291,7 @@ impl PlanViewDetector {
         let corners = detection.bbox.corners().iter().map(shown).collect::<Option<Vec<_>>>()?;
         let bbox = outline.as_ref().map_or_else(|| BoundingBox::around(corners), |outline| Some(outline.bounds()))?;
         let keypoints = detection.keypoints.iter().map(|(point, score)| Some((shown(point)?, *score)));
-        let intrinsics = self.over_table.camera.intrinsics;
-        let picture = [intrinsics.width, intrinsics.height].map(f64::from);
+        let picture = self.picture_size().map(f64::from);
         Some(GraspDetection {
             bbox: bbox.clip(picture[0], picture[1]),
             keypoints: keypoints.collect::<Option<Vec<_>>>()?,

@@ -7,10 +7,14 @@
 //!                          ─ log-odds that are subtracted from every score
 //! ```
 
+use std::ops::RangeInclusive;
+
 use image::{RgbImage, imageops};
 use sdg_demonstration::random::scramble;
-use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
-use sdg_geometry::{BoundingBox, percentile};
+use sdg_demonstration::{
+    Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle, output_size_of,
+};
+use sdg_geometry::{BoundingBox, PlanarSimilarity, percentile};
 
 use super::options::TeachOptions;
 use crate::decimal::decimal;
@@ -19,6 +23,7 @@ use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::taught::TaughtDemonstration;
+use crate::taught_marks::extent;
 
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
 /// hand, not measured.
@@ -34,6 +39,18 @@ const MARGIN: f64 = 0.2;
 const REFUSED_PERCENT: f64 = 10.0;
 /// Minimum IoU of a detection with a part of a held-out sample.
 const MIN_IOU: f64 = 0.5;
+/// Minimum width and height of the surroundings of the part that are cut out of a large plan view, in pixels. Chosen by
+/// hand.
+const MIN_SURROUNDINGS_PX: f64 = 1024.0;
+
+/// A picture without the part in which the taught model still accepts something.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AcceptedNegative {
+    /// Index in [`TeachOptions::negatives`].
+    pub idx: usize,
+    /// The best score in the picture.
+    pub score: f64,
+}
 
 /// Samples made from pictures without the part.
 pub(super) struct AbsentSamples {
@@ -91,7 +108,8 @@ pub(super) fn highest_scores(
 }
 
 /// The model with scores reduced until the pictures without the part are refused, but only so far that nine in ten
-/// held-out samples of the part are still accepted.
+/// held-out samples of the part are still accepted. Pictures that would need more, because they may show the part, are
+/// returned and reduce nothing.
 ///
 /// # Errors
 /// A picture that cannot be searched.
@@ -99,7 +117,7 @@ pub(super) fn calibrated(
     model: GraspModel,
     demonstrations: &[Demonstration],
     options: &TeachOptions,
-) -> Result<GraspModel> {
+) -> Result<(GraspModel, Vec<AcceptedNegative>)> {
     // Pictures of a model with known lengths are plan views.
     let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
     let absent = options
@@ -107,41 +125,93 @@ pub(super) fn calibrated(
         .iter()
         .map(|picture| best_log_odds(&as_used, picture, |_| true))
         .collect::<Result<Vec<Option<f64>>>>()?;
-    let highest = absent.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
-    let log_odds = if highest + MARGIN > 0.0 {
-        let present = on_parts(&as_used, demonstrations, options)?;
-        less_for(highest, &present)
+    let scores: Vec<f64> = absent.iter().flatten().copied().collect();
+    let log_odds = if scores.iter().any(|score| score + MARGIN > 0.0) {
+        less_for(&scores, &on_parts(&as_used, demonstrations, options)?)
     } else {
         0.0
     };
-    let refused = absent.iter().filter(|found| found.is_none_or(|found| found + log_odds < 0.0)).count();
-    let facts = NegativeFacts { pictures: absent.len(), refused, log_odds };
+    let reduced = absent.iter().enumerate().filter_map(|(idx, found)| Some((idx, (*found)? + log_odds)));
+    let accepted: Vec<AcceptedNegative> = reduced
+        .filter(|(_, log_odds)| *log_odds >= 0.0)
+        .map(|(idx, log_odds)| AcceptedNegative { idx, score: 1.0 / (1.0 + (-log_odds).exp()) })
+        .collect();
+    let facts = NegativeFacts { pictures: absent.len(), refused: absent.len() - accepted.len(), log_odds };
     let mut model = model.with_check(|check| check.score.bias += log_odds)?;
     model.facts.negatives = Some(facts);
-    Ok(model)
+    Ok((model, accepted))
 }
 
-/// The log-odds that reduce the highest score without the part to below 0.5, limited so that all but the lowest tenth
-/// of the scores on the part stay above 0.5.
-fn less_for(highest: f64, present: &[f64]) -> f64 {
+/// The log-odds that reduce the scores without the part to below 0.5, limited so that all but the lowest tenth of the
+/// scores on the part stay above 0.5. Scores that this limit does not reduce to below 0.5 do not count.
+fn less_for(absent: &[f64], present: &[f64]) -> f64 {
     let room = percentile(present.iter().copied(), REFUSED_PERCENT).unwrap_or(0.0).max(0.0);
-    decimal(-(highest + MARGIN).clamp(0.0, room))
+    let highest = absent.iter().copied().filter(|score| *score < room).fold(f64::NEG_INFINITY, f64::max);
+    // Adding zero makes a negative zero positive.
+    decimal(-(highest + MARGIN).clamp(0.0, room)) + 0.0
 }
 
 /// The best score on the part in each held-out sample, in log-odds; samples in which the part is not found are left
 /// out.
 fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<f64>> {
-    let sizes = model.held_out_sizes();
-    let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
-    style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
-    let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
-    let augmenter = Augmenter::new(demonstrations, config, options.seed)?;
+    let augmenter = augmenter(demonstrations, &model.held_out_sizes(), options)?;
     let mut found = Vec::new();
     for sample in (0..NUM_POSITIVES).map(|i| augmenter.held_out(FIRST_POSITIVE + i)) {
         let is_part = |bbox: &BoundingBox| sample.objects.iter().any(|object| object.bbox.iou(bbox) >= MIN_IOU);
         found.extend(best_log_odds(model, &sample.image, is_part)?);
     }
     Ok(found)
+}
+
+/// Makes the held-out samples. Those of a model of known size keep the scale of the plan view, because it finds no
+/// smaller part: of a plan view whose samples would be reduced, only the part's surroundings are used.
+fn augmenter(
+    demonstrations: &[Demonstration],
+    sizes: &RangeInclusive<f64>,
+    options: &TeachOptions,
+) -> Result<Augmenter> {
+    let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
+    style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
+    let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
+    let is_reduced = |demonstration: &Demonstration| {
+        let photo: [u32; 2] = demonstration.image.dimensions().into();
+        output_size_of(photo) != photo
+    };
+    if options.lengths.is_none() || !demonstrations.iter().any(is_reduced) {
+        return Ok(Augmenter::new(demonstrations, config, options.seed)?);
+    }
+    let parts = demonstrations.iter().map(|demonstration| extent_of(&demonstration.annotation));
+    let side = parts.map(|part| 2.0 * part.width().max(part.height())).fold(MIN_SURROUNDINGS_PX, f64::max);
+    let cut: Vec<_> = demonstrations.iter().map(|demonstration| surroundings(demonstration, side as u32)).collect();
+    Ok(Augmenter::new(&cut, config, options.seed)?)
+}
+
+fn extent_of(annotation: &Annotation) -> BoundingBox {
+    annotation.grasp.map_or(annotation.bbox, |grasp| extent(&annotation.bbox, &grasp))
+}
+
+/// The part's surroundings in the photo, `side` pixels wide and high, or as many as the photo has.
+fn surroundings(demonstration: &Demonstration, side: u32) -> Demonstration {
+    let Demonstration { image, annotation } = demonstration;
+    let center = extent_of(annotation).center();
+    let range = |center: f64, whole: u32| {
+        let length = side.min(whole);
+        let start = (center - 0.5 * f64::from(length)).round().clamp(0.0, f64::from(whole - length));
+        (start as u32, length)
+    };
+    let ((left, width), (top, height)) = (range(center.x, image.width()), range(center.y, image.height()));
+    let to_cut = PlanarSimilarity::translation(-f64::from(left), -f64::from(top));
+    let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
+    let [x1, x2] = [x1, x2].map(|x| x - f64::from(left));
+    let [y1, y2] = [y1, y2].map(|y| y - f64::from(top));
+    let annotation = Annotation {
+        label: annotation.label.clone(),
+        bbox: BoundingBox { x1, y1, x2, y2 },
+        grasp: annotation.grasp.map(|grasp| grasp.transformed(&to_cut)),
+        jaw_width: annotation.jaw_width,
+        outline: annotation.outline.as_ref().map(|outline| outline.transformed(&to_cut)),
+    };
+    Demonstration { image: imageops::crop_imm(image, left, top, width, height).to_image(), annotation }
 }
 
 /// The best score of the counted detections in a picture, in log-odds.
@@ -154,6 +224,7 @@ fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&Boundi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check_config::CheckConfig;
     use crate::facts::ModelKind;
     use crate::lengths::Lengths;
     use crate::teach::teach;
@@ -164,10 +235,13 @@ mod tests {
     #[test]
     fn scores_are_lowered_below_a_half_but_not_at_the_cost_of_the_part() {
         let present = [3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0];
-        assert!((less_for(1.0, &present) + 1.2).abs() < 1e-9);
-        // A picture as similar to the part as the part itself: nine in ten samples are still accepted.
-        assert!((less_for(9.0, &present) + 3.1).abs() < 1e-9);
-        assert_eq!(less_for(1.0, &[]), 0.0, "nothing is known of the part");
+        assert!((less_for(&[0.4, 1.0], &present) + 1.2).abs() < 1e-9);
+        // With the margin, nine in ten samples are still accepted.
+        assert!((less_for(&[3.0], &present) + 3.1).abs() < 1e-9);
+        // A picture as similar to the part as the part itself would be accepted in any case, and reduces nothing.
+        assert!((less_for(&[9.0, 1.0], &present) + 1.2).abs() < 1e-9);
+        let none = [less_for(&[9.0], &present), less_for(&[-3.0], &present), less_for(&[1.0], &[])];
+        assert_eq!(none.map(f64::to_bits), [0.0_f64.to_bits(); 3]);
     }
 
     #[test]
@@ -188,6 +262,31 @@ mod tests {
     }
 
     #[test]
+    fn samples_of_known_size_keep_the_scale_of_a_large_plan_view() {
+        // The part in the middle of a view whose own samples would have two thirds of its width.
+        let Demonstration { image: small, mut annotation } = demonstration();
+        let left = 6000;
+        let mut image = RgbImage::from_pixel(12_000, small.height(), image::Rgb([60, 60, 70]));
+        imageops::replace(&mut image, &small, i64::from(left), 0);
+        let moved = PlanarSimilarity::translation(f64::from(left), 0.0);
+        annotation.grasp = annotation.grasp.map(|grasp| grasp.transformed(&moved));
+        annotation.outline = annotation.outline.map(|outline| outline.transformed(&moved));
+        annotation.bbox = annotation.outline.as_ref().unwrap().bounds();
+        let large = [Demonstration { image, annotation }];
+        let mut options = TeachOptions::new(1);
+        let sizes = CheckConfig::KNOWN_SAMPLE_SIZES;
+        let scale = |options: &TeachOptions| {
+            let augmenter = augmenter(&large, &sizes, options).unwrap();
+            (augmenter.output_size()[0], augmenter.held_out(0).objects[0].image_from_demonstration.scale)
+        };
+        let (width, reduced) = scale(&options);
+        assert!(width == 8192 && reduced < 0.8, "{width} {reduced}");
+        options.lengths = Some(Lengths::of_level_photos(1000.0, 0.01, 0.005));
+        let (width, kept) = scale(&options);
+        assert!(width == 1024 && (0.85..1.15).contains(&kept), "{width} {kept}");
+    }
+
+    #[test]
     fn a_demonstration_is_no_picture_without_the_part() {
         let demonstrations = [demonstration()];
         let mut options = TeachOptions::new(1);
@@ -199,48 +298,61 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_without_the_part_lowers_the_score_and_the_file_keeps_it() {
+    fn a_picture_with_the_part_is_returned_and_lowers_no_score() {
         let demonstrations = [demonstration()];
         let mut options = TeachOptions::new(1);
         options.kind = ModelKind::S;
         let teach_s =
-            |options: &TeachOptions| teach(&demonstrations, options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-        let before = teach_s(&options);
+            |options: &TeachOptions| teach(&demonstrations, options, &mut |_| ControlFlow::Continue(())).unwrap();
+        let before = teach_s(&options).model;
         let photo = &demonstrations[0].image;
         let score = |model: &GraspModel| model.detect(photo, Verification::ByShape).unwrap()[0].score;
         assert!(score(&before) > 0.9);
-        // The photo with one changed pixel, declared to be without the part, is as similar as possible: scores are
-        // reduced to the limit and no further.
+        // The photo with one changed pixel, declared to be without the part, is as similar as possible.
         let mut nearly = photo.clone();
         nearly.put_pixel(0, 0, image::Rgb([0, 0, 0]));
         assert_ne!(nearly, *photo);
         options.negatives = vec![nearly, RgbImage::from_pixel(photo.width(), photo.height(), image::Rgb([90, 90, 90]))];
         let after = teach_s(&options);
-        let facts = after.facts().negatives.unwrap();
-        assert!(facts.log_odds < -0.5 && facts.pictures == 2 && (1..=2).contains(&facts.refused), "{facts:?}");
-        assert!(score(&after) < score(&before));
-        let read = GraspModel::from_bytes(&after.to_bytes().unwrap(), &Device::flex()).unwrap();
-        assert_eq!(score(&read), score(&after));
-        // Pictures whose detections are already refused change nothing.
+        let facts = after.model.facts().negatives.unwrap();
+        assert_eq!(facts, NegativeFacts { pictures: 2, refused: 1, log_odds: 0.0 });
+        let [AcceptedNegative { idx: 0, score: nearly_score }] = after.accepted_negatives[..] else {
+            panic!("{:?}", after.accepted_negatives)
+        };
+        assert!(nearly_score > 0.9, "{nearly_score}");
+        assert_eq!(score(&after.model), score(&before));
+        // Pictures whose detections are already refused change nothing either.
         options.negatives.remove(0);
-        assert_eq!(
-            teach_s(&options).facts().negatives.unwrap(),
-            NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 }
-        );
+        let after = teach_s(&options);
+        let facts = after.model.facts().negatives.unwrap();
+        assert_eq!(facts, NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 });
+        assert!(after.accepted_negatives.is_empty());
     }
 
     #[test]
-    fn a_picture_without_the_part_lowers_the_score_of_a_model_of_known_size() {
+    fn the_file_keeps_reduced_scores() {
+        let demonstrations = [demonstration()];
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        let before = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        let mut reduced = before.clone().with_check(|check| check.score.bias -= 0.5).unwrap();
+        reduced.facts.negatives = Some(NegativeFacts { pictures: 1, refused: 1, log_odds: -0.5 });
+        let read = GraspModel::from_bytes(&reduced.to_bytes().unwrap(), &Device::flex()).unwrap();
+        let photo = &demonstrations[0].image;
+        let score = |model: &GraspModel| model.detect(photo, Verification::ByShape).unwrap()[0].score;
+        assert!(score(&read) == score(&reduced) && score(&read) < score(&before));
+    }
+
+    #[test]
+    fn a_model_of_known_size_accepts_the_held_out_samples() {
         let demonstrations = [demonstration()];
         // Nine in ten of this seed's samples of the right size have at least 3.5 log-odds without a term of the size.
         let mut options = TeachOptions::new(10);
         options.kind = ModelKind::S;
         options.lengths = Some(Lengths::of_level_photos(1000.0, 0.01, 0.005));
-        let mut nearly = demonstrations[0].image.clone();
-        nearly.put_pixel(0, 0, image::Rgb([0, 0, 0]));
-        options.negatives = vec![nearly];
         let model = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-        let facts = model.facts().negatives.unwrap();
-        assert!(facts.log_odds < -0.5, "{facts:?}");
+        let present = on_parts(&model.of_known_size().unwrap(), &demonstrations, &options).unwrap();
+        let room = percentile(present.iter().copied(), REFUSED_PERCENT).unwrap();
+        assert!(room > 0.5, "{present:?}");
     }
 }

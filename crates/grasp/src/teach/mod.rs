@@ -56,6 +56,7 @@ use crate::search_window::check_region;
 use crate::taught::TaughtDemonstration;
 
 use absent::AbsentSamples;
+pub use absent::AcceptedNegative;
 use edge_height::edge_height;
 pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
@@ -78,6 +79,8 @@ pub struct Taught {
     pub model: GraspModel,
     /// Losses and validations of the detector; `None` for model S, which has none.
     pub history: Option<History>,
+    /// The pictures without the part in which the model still accepts something.
+    pub accepted_negatives: Vec<AcceptedNegative>,
 }
 
 /// Teaches a grasp model. `observe` is called after every step and validation, and may stop teaching, which then
@@ -115,11 +118,11 @@ pub fn teach(
                 NegativeScenes::new(&alone, options.seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?
                     .observe(None)?
                     .resemblance();
-            Taught { model: by_search, history: None }
+            Taught { model: by_search, history: None, accepted_negatives: Vec::new() }
         }
     };
     if !options.negatives.is_empty() {
-        taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
+        (taught.model, taught.accepted_negatives) = absent::calibrated(taught.model, demonstrations, &options)?;
     }
     taught.model.facts.lengths = lengths;
     taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
@@ -367,5 +370,5 @@ pub(crate) fn teach_network(
         },
         facts,
     };
-    Ok(Taught { model, history: Some(history) })
+    Ok(Taught { model, history: Some(history), accepted_negatives: Vec::new() })
 }

@@ -282,21 +282,15 @@ fn a_photo_with_another_number_of_pixels_teaches_as_well() {
 }
 
 #[test]
-fn a_photo_longer_than_the_largest_sample_teaches_with_and_without_a_network() {
+fn a_photo_longer_than_the_largest_sample_has_samples_and_teaches() {
     let mut wide = demonstration();
     wide.image = RgbImage::from_pixel(9000, 112, Rgb([60, 60, 70]));
     image::imageops::replace(&mut wide.image, &demonstration().image, 0, 0);
     let wide = [wide];
     without_network(&wide).unwrap();
     let options = TeachOptions { kind: ModelKind::C, ..TeachOptions::new(1) };
-    let mut teaching = small_teaching(&options);
-    // The part is 16 pixels long in the training samples and at the network's input.
-    let [width_px, height_px] = [2304, 32];
-    teaching.samples = teaching.samples.with_output_size(width_px, height_px);
-    teaching.detector.network.input.resize = ResizeRule::FitWithin { width_px, height_px };
-    let proceed = &mut |_: &TeachingEvent| ControlFlow::Continue(());
-    let taught = teach_network(&wide, &wide, &teaching, &options, proceed, Instant::now()).unwrap();
-    assert_eq!(taught.model.facts().steps, STEPS);
+    let held_back = Augmenter::new(&wide, small_teaching(&options).held_back, 1).unwrap();
+    assert_eq!(held_back.sample(0).image.width(), 8192);
 }
 
 #[test]

@@ -50,6 +50,14 @@ impl PartDetector {
         }
     }
 
+    /// Width and height of a picture whose searched image has this size.
+    pub(super) fn picture_size(&self, searched: [u32; 2]) -> [u32; 2] {
+        match self {
+            Self::Picture(_) => searched,
+            Self::PlanView(detector) => detector.picture_size(),
+        }
+    }
+
     /// The pixels of a rectangle of the searched image.
     pub(super) fn window(&self, picture: &RgbImage, rect: &PixelRect) -> RgbImage {
         match self {

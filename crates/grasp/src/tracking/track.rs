@@ -322,6 +322,7 @@ impl Track {
         let placed = PlacedDemonstration {
             demonstration: self.part.demonstration(detector),
             demonstration_idx: self.part.demonstration_idx,
+            range_idx: 0,
             image_from_cutout: followed.image_from_cutout,
             image_from_marks: followed.image_from_cutout.compose(&self.cutout_from_marks),
             colors: self.part.colors,

@@ -484,12 +484,12 @@ impl Tracker {
     }
 }
 
-/// Converts a detection in the searched image to its reported form; `None` if the camera does not show the part or the
-/// part lies outside the searched region of the picture.
+/// Converts a detection in the searched image, which has this size, to its reported form; `None` if the camera does not
+/// show the grasp point or the part lies outside the searched region of the picture.
 fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
     detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
-    let is_in_region = |shown: &Shown| detector.region().is_none_or(|region| shown.0.lies_in(region));
-    detector.output(detection).filter(is_in_region)
+    let picture = detector.picture_size(size);
+    detector.output(detection).filter(|shown| shown.0.lies_within(detector.region(), picture))
 }
 
 impl Tracked {

@@ -1,17 +1,17 @@
 //! Text as outlines: DejaVu Sans, reduced to the characters of labels.
 //!
-//! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with printable ASCII,
-//! [`CHARACTERS`] and `--no-hinting --layout-features='' --notdef-outline`; its licence is in the same folder. Other
-//! characters are drawn as a box.
+//! assets/DejaVuSans-subset.ttf was made from DejaVu Sans 2.37 by fontTools' `pyftsubset` with printable ASCII, U+00A0
+//! to U+00FF (Latin-1), [`CHARACTERS`] and `--no-hinting --layout-features='' --notdef-outline`; its licence is in the
+//! same folder. Other characters are drawn as a box.
 
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, OutlineCurve, Point};
 use tiny_skia::{Path, PathBuilder};
 
-/// Characters of the font in addition to printable ASCII.
+/// Characters of the font in addition to printable ASCII and Latin-1.
 #[cfg(test)]
-const CHARACTERS: &str = "\u{a0}°±µ·×μ–’…→−✓";
+const CHARACTERS: &str = "μ–’…→−✓";
 
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(include_bytes!("../../assets/DejaVuSans-subset.ttf")).expect("the font in assets/ is whole")
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn every_character_of_labels_has_a_glyph() {
-        for character in ('!'..='~').chain(CHARACTERS.chars()) {
+        for character in ('!'..='~').chain('\u{a0}'..='ÿ').chain(CHARACTERS.chars()) {
             assert_ne!(FONT.glyph_id(character).0, 0, "{character:?} has no glyph");
         }
         assert_eq!(FONT.glyph_id('\u{4e00}').0, 0);

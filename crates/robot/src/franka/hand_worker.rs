@@ -52,7 +52,7 @@ impl HandWorker {
     }
 
     /// Stops the fingers; a call that waits for them returns.
-    pub(super) fn stop(&self) {
+    fn stop(&self) {
         // An error means that the hand is disconnected; this program cannot stop it then.
         let _ = self.stop.stop();
     }

@@ -192,6 +192,13 @@ impl FrankaArm {
         }
     }
 
+    /// Passes the states of a duration to `watch`.
+    fn observe_for(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        let begun_secs = self.observe(watch)?.time_secs;
+        while self.observe(watch)?.time_secs < begun_secs + duration_secs {}
+        Ok(())
+    }
+
     /// The next state, checked by `watch`.
     fn observe(&mut self, watch: &mut Watch) -> Result<ArmState> {
         let state = self.state()?;
@@ -223,9 +230,11 @@ impl Arm for FrankaArm {
     }
 
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
-        let begun_secs = self.observe(watch)?.time_secs;
-        while self.observe(watch)?.time_secs < begun_secs + duration_secs {}
-        Ok(())
+        let waited = self.observe_for(duration_secs, watch);
+        if waited.is_err() {
+            self.hand.stop_motion();
+        }
+        waited
     }
 
     fn hand(&mut self) -> Result<HandState> {
@@ -268,8 +277,11 @@ impl Arm for FrankaArm {
     }
 
     fn stop(&mut self) -> Result<()> {
-        self.hand.stop();
-        self.robot.stop().map_err(|error| self.error(error))
+        self.hand.stop_motion();
+        match self.robot.state().robot_mode {
+            RobotMode::Move => self.robot.stop().map_err(|error| self.error(error)),
+            _ => Ok(()),
+        }
     }
 
     fn recover(&mut self) -> Result<()> {
@@ -286,8 +298,10 @@ impl Arm for FrankaArm {
 
 impl CompliantArm for FrankaArm {
     fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
-        self.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        self.in_control(|arm| arm.come_down(touch_down, watch))
+        self.in_control(|arm| {
+            arm.set_contact_sensitivity(ContactSensitivity::Contact)?;
+            arm.come_down(touch_down, watch)
+        })
     }
 }
 

@@ -11,6 +11,7 @@ use crate::height::HeightMeasurement;
 use crate::lying_part::LyingPart;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
+use crate::place::Place;
 use crate::touch::TouchDown;
 
 /// Default centre of the first picture on the table, base frame, m.
@@ -75,6 +76,8 @@ pub struct GraspConfig {
     pub part: Option<PartShape>,
     /// Parts lying in the cell that are known before a picture is taken and must not be touched.
     pub lying: Vec<LyingPart>,
+    /// All places of the cell: a part that lies in one of them did not fall beside a bin.
+    pub places: Vec<Place>,
     /// Speed of the motions.
     pub pace: Pace,
 }
@@ -104,6 +107,7 @@ impl Default for GraspConfig {
             part_radius_m: 0.06,
             part: None,
             lying: Vec::new(),
+            places: Vec::new(),
             pace: Pace::REHEARSED,
         }
     }

@@ -1,7 +1,7 @@
 //! Closing, lifting and holding; the hand's width and force show whether the part is held.
 
 use nalgebra::Isometry3;
-use sdg_kinematics::collision::Checker;
+use sdg_kinematics::collision::{Body, Checker};
 use sdg_kinematics::planning::{CheckedLine, checked_line};
 use sdg_kinematics::{CartesianLimits, JointPath, JointVector, LineOptions, Trajectory};
 
@@ -13,14 +13,12 @@ use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, Load, MAX_WIDT
 use crate::error::RobotError;
 use crate::grasp_target::GraspTarget;
 use crate::perception::GraspStep;
-use crate::surroundings::Surroundings;
+use crate::surroundings::{LINE_MARGIN_M, NEAR_AT_START_M, Surroundings};
 
 /// Speed at which the opening changes when the hand closes, m/s.
 const CLOSING_SPEED_M_S: f64 = 0.1;
 /// Steps by which a straight motion up is shortened if the arm cannot follow the whole motion, m.
 const UP_STEP_M: f64 = 0.05;
-/// Minimum distance from the obstacles of the cell on straight motions, m.
-const LINE_MARGIN_M: f64 = 0.003;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Closes the hand on the part.
@@ -68,7 +66,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let base_from_tcp = self.robot.geometry().forward(&start);
         let mut up_m = max_m;
         loop {
-            let planned = match self.free_line(&start, &above(&base_from_tcp, up_m))? {
+            let planned = match self.free_line_up(&start, &above(&base_from_tcp, up_m))? {
                 Ok(path) => fails_at(step, self.robot.plan_safely_along(&path, limits)),
                 Err(why) => Err(Stop::Failed(step, why)),
             };
@@ -79,16 +77,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// A straight motion free of obstacles; otherwise the reason why there is none.
-    pub(super) fn free_line(
-        &self,
-        start: &JointVector,
-        base_from_tcp: &Isometry3<f64>,
-    ) -> Steps<Result<JointPath, String>> {
-        self.free_line_among(&self.surroundings(), start, base_from_tcp)
+    /// A straight motion up that gets no nearer to obstacles that are near the hand at its start.
+    fn free_line_up(&self, start: &JointVector, base_from_tcp: &Isometry3<f64>) -> Steps<Result<JointPath, String>> {
+        let surroundings = Surroundings { may_start_near: true, ..self.surroundings() };
+        self.free_line_among(&surroundings, start, base_from_tcp)
     }
 
-    /// As [`Self::free_line`], with some of the surroundings left out.
+    /// A straight motion free of obstacles; otherwise the reason why there is none.
     pub(super) fn free_line_among(
         &self,
         surroundings: &Surroundings<'_>,
@@ -100,7 +95,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let line = arm.straight_path(start, base_from_tcp, &LineOptions::default());
             return Ok(line.map_err(|error| error.to_string()));
         }
-        let model = surroundings.contact_model(arm, self.robot.limits().table_height_m)?;
+        let mut model = surroundings.contact_model(arm, self.robot.limits().table_height_m)?;
+        if surroundings.may_start_near {
+            model.allow_overlaps_at(Body::HAND, start, NEAR_AT_START_M);
+        }
         let mut checker = Checker::new(&model, LINE_MARGIN_M);
         let line = checked_line(arm, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
         let CheckedLine { share, path, blocked_by } = line;

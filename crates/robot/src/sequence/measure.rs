@@ -50,11 +50,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let settled = settled.map_err(|why| Stop::Failed(GraspStep::Detect, why))?;
         self.known.surface_m = Some(settled.height_m - measurement.mark_height_m);
         let target = match (settled.source, &sightings[..]) {
-            (HeightSource::Measured, [..]) => between(&sightings, settled.height_m),
+            (HeightSource::Measured, [..]) => between(seen, &sightings, settled.height_m),
             // Even a single picture was taken from closer to the part than the picture of its detection.
             (HeightSource::Told, [nearer]) => Some(nearer.at_height(settled.height_m).target),
             (HeightSource::Told, []) => None,
-            (HeightSource::Told, several) => between(several, settled.height_m),
+            (HeightSource::Told, several) => between(seen, several, settled.height_m),
         };
         let mut target = target.unwrap_or(*seen);
         target.base_from_tcp.translation.z = settled.height_m - measurement.marks_over_grasp_m();
@@ -189,13 +189,18 @@ fn nearest(seen: &GraspTarget, shown: &[Sighting], height_m: f64) -> Option<Sigh
 }
 
 /// The mean grasp of several sightings of one part, with its marks at a height; `None` without sightings.
-fn between(sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
-    let targets: Vec<GraspTarget> = sightings.iter().map(|sighting| sighting.at_height(height_m).target).collect();
-    let first = *targets.first()?;
+///
+/// A symmetric part may be detected in any of its equivalent orientations, whose mean is none of them. Only the
+/// sighting whose orientation is nearest to that of the detected part, and those that confirm it, therefore count.
+fn between(seen: &GraspTarget, sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
+    let mut targets: Vec<GraspTarget> = sightings.iter().map(|sighting| sighting.at_height(height_m).target).collect();
     let yaw = |target: &GraspTarget| {
         let along = target.base_from_tcp.rotation * Vector3::x();
         Angle::from_direction(along.x, along.y)
     };
+    let apart_rad = |one: &GraspTarget, other: &GraspTarget| (yaw(one) - yaw(other)).radians().abs();
+    let first = targets.iter().min_by(|a, b| apart_rad(a, seen).total_cmp(&apart_rad(b, seen))).copied()?;
+    targets.retain(|target| apart_rad(target, &first) <= CONFIRMING_TOLERANCE.1);
     let share = 1.0 / targets.len() as f64;
     let (mut middle, mut turn_rad, mut width_m, mut score) = (Vector3::zeros(), 0.0, 0.0, f64::INFINITY);
     for target in &targets {

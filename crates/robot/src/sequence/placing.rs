@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::grasp_target::GraspTarget;
 use crate::lying_part::{LyingPart, LyingParts};
 use crate::perception::{GraspStep, PartFinder, StepObserver};
-use crate::place::{PlaceGoal, PlaceOffset};
+use crate::place::{Place, PlaceGoal, PlaceOffset};
 use crate::robot::Robot;
 use crate::room::{release_opening_m, same_turns_rad};
 use crate::touch::{TouchDown, Touched};
@@ -313,7 +313,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let nearest = nearest.filter(|found| found.score >= SURE);
             self.note_others();
             let found = match goal.bin_m {
-                Some(_) => put_into_bin(goal, base_from_part, nearest.into_iter().chain(self.finder.others()), older),
+                Some(_) => {
+                    let shown = nearest.into_iter().chain(self.finder.others());
+                    put_into_bin(goal, base_from_part, shown, older, &self.cell.config.places)
+                }
                 None => nearest.filter(|found| apart_m(base_from_part, found) <= max_offset_m(goal)),
             };
             if let Some(found) = found {
@@ -342,22 +345,27 @@ fn max_offset_m(goal: &PlaceGoal) -> f64 {
     half_pitches_m.fold(OTHER_PART_M, f64::min)
 }
 
-/// The part that was put into a bin, of all parts in a picture: preferably one that was not known before, which may also
-/// lie beside the bin.
+/// The part that was put into a bin, of all parts in a picture: preferably one that was not known before, in the bin or
+/// else beside it. A part in another one of the `places` is not beside the bin.
 fn put_into_bin(
     goal: &PlaceGoal,
     base_from_part: &Isometry3<f64>,
     shown: impl Iterator<Item = GraspTarget>,
     older: &LyingParts,
+    places: &[Place],
 ) -> Option<GraspTarget> {
     let is_older = |found: &GraspTarget| older.all().iter().any(|part| part.is_at(&found.base_from_tcp));
-    let is_here = |found: &GraspTarget| {
-        let max_m = if is_older(found) { 0.0 } else { MAX_BESIDE_BIN_M };
-        outside_bin_m(goal, found).is_some_and(|outside_m| outside_m <= max_m)
+    let is_inside = |found: &GraspTarget| outside_bin_m(goal, found) == Some(0.0);
+    let is_beside = |found: &GraspTarget| {
+        let p = found.base_from_tcp.translation;
+        outside_bin_m(goal, found).is_some_and(|outside_m| outside_m <= MAX_BESIDE_BIN_M)
+            && !places.iter().any(|place| place.covers([p.x, p.y]))
     };
+    let is_here = |found: &GraspTarget| is_inside(found) || (!is_older(found) && is_beside(found));
     let distance_m = |found: &GraspTarget| apart_m(base_from_part, found);
     let nearest = |a: &GraspTarget, b: &GraspTarget| distance_m(a).total_cmp(&distance_m(b));
-    shown.filter(is_here).min_by(|a, b| is_older(a).cmp(&is_older(b)).then_with(|| nearest(a, b)))
+    let rank = |found: &GraspTarget| (is_older(found), !is_inside(found));
+    shown.filter(is_here).min_by(|a, b| rank(a).cmp(&rank(b)).then_with(|| nearest(a, b)))
 }
 
 /// Horizontal distance of a detection from a place, m.

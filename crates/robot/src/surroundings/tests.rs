@@ -4,7 +4,6 @@ use crate::planned_arm::PlannedArm;
 use crate::safety::SafetyLimits;
 use crate::watch::Watch;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
-use sdg_kinematics::collision::Checker;
 use sdg_kinematics::ready_pose;
 
 fn wall(name: &str, half_m: [f64; 3], at: [f64; 3]) -> Obstacle {

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
 use super::place_sections::{BinSection, PlaceSection, Room, TraySection, places};
-use super::source::{MAX_REACH_MM, Numbers, Source};
+use super::source::{MAX_REACH_MM, METRES, Numbers, Source};
 use super::{RobotModel, Workcell};
 use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
@@ -157,12 +157,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         && (f64::MIN_POSITIVE..MIN_FINGERTIP_MM).contains(&found)
     {
         let expected = format!("0, or a number from {MIN_FINGERTIP_MM} to {MAX_FINGERTIP_MM}");
-        return Err(source.expected(
-            value,
-            "fingertip_beyond_tcp_mm",
-            &expected,
-            format!("{found}: metres given as millimetres?"),
-        ));
+        return Err(source.expected(value, "fingertip_beyond_tcp_mm", &expected, format!("{found}{METRES}")));
     }
     let [x, y, z] = [
         source.range_m(&file.workspace.x_mm, "x_mm")?,
@@ -173,7 +168,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     if look_outs.is_empty() {
         return Err(source.expected(&file.look_out, "look_out", "at least one", "none"));
     }
-    let table_height_m = source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3;
+    let table_height_m = source.length_mm(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3;
     let table_m = match (&file.table.x_mm, &file.table.y_mm) {
         (None, None) => None,
         (Some(x), Some(y)) => Some([source.range_m(x, "x_mm")?, source.range_m(y, "y_mm")?]),

@@ -166,6 +166,7 @@ impl Workcell {
             load,
             obstacles: self.obstacles.clone(),
             part_radius_m: self.part_radius_m,
+            places: self.places.clone(),
             ..GraspConfig::default()
         }
     }
@@ -202,9 +203,11 @@ impl Workcell {
                 false => format!("one of {}", names.join(", ")),
             }));
         };
-        match (cell, place.num_cells()) {
-            (None, num) if num > 1 => Err(wrong(format!("{name}:1 to {name}:{num}, a cell of the tray"))),
-            (cell, _) => place.goal(cell.unwrap_or(1)),
+        let num = place.num_cells();
+        match cell.or((num == 1).then_some(1)) {
+            Some(cell) if (1..=num).contains(&cell) => place.goal(cell),
+            _ if num == 1 => Err(wrong(format!("{name}, which has no cells"))),
+            _ => Err(wrong(format!("{name}:1 to {name}:{num}, a cell of the tray"))),
         }
     }
 

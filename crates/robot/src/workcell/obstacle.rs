@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::WorkcellError;
-use super::source::{MAX_REACH_MM, Numbers, Source};
+use super::source::{MAX_REACH_MM, METRES, Numbers, Source};
 use crate::surroundings::TABLE;
 
 /// Smallest and largest length of an obstacle, mm.
@@ -46,6 +46,10 @@ fn obstacle(source: &Source<'_>, section: &Spanned<ObstacleSection>) -> Result<O
     if !at.iter().all(|value| value.abs() <= 2.0 * MAX_REACH_MM) {
         let expected = format!("numbers within {} mm of the base", 2.0 * MAX_REACH_MM);
         return Err(source.expected(at_mm, "at_mm", &expected, format!("{at:?}")));
+    }
+    // Within reach as metres; as millimetres, the obstacle would stand in the robot's base.
+    if at[..2] != [0.0; 2] && at.iter().all(|value| value.abs() <= 2e-3 * MAX_REACH_MM) {
+        return Err(source.expected(at_mm, "at_mm", "numbers in mm", format!("{at:?}{METRES}")));
     }
     let turn = match rpy_deg {
         None => UnitQuaternion::identity(),

@@ -108,15 +108,13 @@ fn common(
         let expected = format!("x and y within {MAX_REACH_MM} mm of the base");
         return Err(source.expected(at_mm, at_name, &expected, format!("{at:?}")));
     }
-    let number = |value: &Option<Spanned<f64>>, name: &str, range: [f64; 2]| match value {
-        None => Ok(0.0),
-        Some(value) => source.number(value, name, range),
-    };
+    let yaw_deg = yaw_deg.as_ref().map(|yaw| source.number(yaw, "yaw_deg", [-360.0, 360.0])).transpose()?;
+    let height_mm = height_mm.as_ref().map(|height| source.length_mm(height, "height_mm", SURFACES_MM)).transpose()?;
     Ok(Place {
         name: name.get_ref().clone(),
         at_m: at.map(|value| value * 1e-3),
-        yaw_rad: number(yaw_deg, "yaw_deg", [-360.0, 360.0])?.to_radians(),
-        surface_m: room.table_height_m + number(height_mm, "height_mm", SURFACES_MM)? * 1e-3,
+        yaw_rad: yaw_deg.unwrap_or(0.0).to_radians(),
+        surface_m: room.table_height_m + height_mm.unwrap_or(0.0) * 1e-3,
         kind,
     })
 }

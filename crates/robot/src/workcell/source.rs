@@ -9,6 +9,10 @@ use super::error::WorkcellError;
 pub(super) const MAX_REACH_MM: f64 = 1500.0;
 /// Minimum width of a workspace or table, mm.
 const MIN_RANGE_MM: f64 = 10.0;
+/// Minimum absolute value of a length other than 0, mm: a smaller one was probably given in metres.
+const MIN_LENGTH_MM: f64 = 0.1;
+/// Ends the errors of such lengths.
+pub(super) const METRES: &str = ": metres given as millimetres?";
 
 /// Exactly this many numbers; serde's own arrays ignore further ones.
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -52,11 +56,20 @@ impl Source<'_> {
         Err(self.expected(value, name, &format!("a number from {min} to {max}"), found))
     }
 
+    /// A length, at least [`MIN_LENGTH_MM`] if it is not 0.
+    pub(super) fn length_mm(&self, value: &Spanned<f64>, name: &str, range: [f64; 2]) -> Result<f64, WorkcellError> {
+        let found = self.number(value, name, range)?;
+        if found != 0.0 && found.abs() < MIN_LENGTH_MM {
+            return Err(self.expected(value, name, "millimetres", format!("{found}{METRES}")));
+        }
+        Ok(found)
+    }
+
     pub(super) fn range_m(&self, value: &Spanned<Numbers<2>>, name: &str) -> Result<[f64; 2], WorkcellError> {
         let Numbers([min, max]) = *value.get_ref();
         if min < max && max - min < MIN_RANGE_MM {
             let expected = format!("[smallest, largest] in mm, at least {MIN_RANGE_MM} apart");
-            return Err(self.expected(value, name, &expected, format!("[{min}, {max}]: metres given as millimetres?")));
+            return Err(self.expected(value, name, &expected, format!("[{min}, {max}]{METRES}")));
         }
         if min < max && min >= -MAX_REACH_MM && max <= MAX_REACH_MM {
             return Ok([min * 1e-3, max * 1e-3]);

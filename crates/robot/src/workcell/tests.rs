@@ -57,6 +57,7 @@ fn errors_name_the_line() {
         (10, "kg = 0.2", "kg = \"heavy\"", "expected f64"),
         (14, "\"hand\"", "\"wall\"", "expected \"hand\" or \"base\", found \"wall\""),
         (17, "-12.5", "-12500", "height_mm: expected a number from -1000 to 1000, found -12500"),
+        (17, "-12.5", "-0.0125", "height_mm: expected millimetres, found -0.0125: metres given as millimetres?"),
         (20, "[200, 800]", "[800, 200]", "x_mm: expected [smallest, largest] in mm"),
         (
             20,
@@ -123,7 +124,8 @@ fn places_are_where_the_file_says() {
     assert_eq!(cell.place("bin").unwrap().bin_m, Some([0.2, 0.15]));
     for (text, expected) in [
         ("tray", "expected tray:1 to tray:20, a cell of the tray, found \"tray\""),
-        ("tray:21", "expected 1 to 20, found 21"),
+        ("tray:21", "place: expected tray:1 to tray:20, a cell of the tray, found \"tray:21\""),
+        ("shelf:2", "place: expected shelf, which has no cells, found \"shelf:2\""),
         ("tray:x", "expected NAME, or NAME:CELL"),
         ("box", "expected one of shelf, tray, bin, found \"box\""),
     ] {
@@ -142,6 +144,7 @@ fn places_that_cannot_be_name_the_line() {
         (34, "[450, 300]", "[450, 300, 0]", "expected 2 numbers, found 3"),
         (35, "yaw_deg = 90", "yaw_deg = inf", "yaw_deg: expected a number from -360 to 360, found inf"),
         (36, "height_mm = 20", "height_mm = -5", "height_mm: expected a number from 0 to 500, found -5"),
+        (36, "height_mm = 20", "height_mm = 0.02", "expected millimetres, found 0.02: metres given as millimetres?"),
         (39, "\"tray\"", "\"shelf\"", "name: expected a unique name, found a second \"shelf\""),
         (39, "\"tray\"", "\"a:b\"", "expected a name without \":\""),
         (40, "[350, -400]", "[350, -480]", "\"tray\" reaches over the table's edge: its corner is at (320, -505) mm"),
@@ -218,6 +221,7 @@ fn obstacles_that_make_no_sense_name_the_line() {
     for (line, from, to, expected) in [
         (32, "box_mm = [200, 100, 300]", "box_mm = [200, 0, 300]", "box_mm: expected lengths from 1 to 5000 mm"),
         (33, "at_mm = [500, 300, 150]", "at_mm = [500, nan, 150]", "at_mm: expected numbers within 3000 mm"),
+        (33, "[500, 300, 150]", "[0.5, 0.3, 0.15]", "found [0.5, 0.3, 0.15]: metres given as millimetres?"),
         (34, "[0, 0, 90]", "[0, 0, 900]", "rpy_deg: expected angles from -360 to 360"),
         (37, "\"post\"", "\"fixture\"", "name: expected a unique name, found a second \"fixture\""),
         (37, "\"post\"", "\"table\"", "found a second \"table\""),

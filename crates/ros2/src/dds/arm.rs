@@ -247,7 +247,7 @@ impl TrajectoryArm {
 
     fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
         let ended = self.motions.cancel(goal, ANSWER).and_then(|_| self.motions.result(goal, ANSWER));
-        check_cancelled(ended, self.motions.name()).map_err(|why| self.lost(why))?;
+        check_cancelled(ended, self.motions.name(), "the arm").map_err(|why| self.lost(why))?;
         // The controller holds the position at which the arm stopped.
         self.forget_reference();
         Ok(())
@@ -258,13 +258,14 @@ impl TrajectoryArm {
 fn check_cancelled<E>(
     ended: std::result::Result<Option<E>, RosError>,
     action: &str,
+    moved: &str,
 ) -> std::result::Result<(), String> {
     let why = match ended {
         Ok(Some(_)) => return Ok(()),
         Ok(None) => format!("{action} did not end the motion within {} s after its cancellation", ANSWER.as_secs()),
         Err(error) => format!("the cancellation of the motion was not confirmed: {error}"),
     };
-    Err(format!("{why}; the arm may still move"))
+    Err(format!("{why}; {moved} may still move"))
 }
 
 /// The error to report for a motion that failed with `error` and was then cancelled. If it could not be cancelled, the
@@ -409,13 +410,10 @@ impl Arm for TrajectoryArm {
 
     /// Stops the hand; a motion of the arm ends with the call that started it.
     fn stop(&mut self) -> Result<()> {
-        if let Some((_, goal)) = &self.hand {
-            let failed = |error: RosError| {
-                RobotError::Hand(format!("its stop was not confirmed: {error}; the fingers may still move"))
-            };
-            self.gripper.cancel(goal, ANSWER).map_err(failed)?;
-            self.hand = None;
-        }
+        let Some((_, goal)) = &mut self.hand else { return Ok(()) };
+        let ended = self.gripper.cancel(goal, ANSWER).and_then(|_| self.gripper.result(goal, ANSWER));
+        check_cancelled(ended, self.gripper.name(), "the fingers").map_err(RobotError::Hand)?;
+        self.hand = None;
         Ok(())
     }
 
@@ -448,7 +446,7 @@ mod tests {
 
     #[test]
     fn a_motion_that_goes_on_after_its_cancellation_is_not_reported_as_stopped() {
-        assert!(check_cancelled(Ok(Some(GoalEnd::Aborted)), "/follow").is_ok());
+        assert!(check_cancelled(Ok(Some(GoalEnd::Aborted)), "/follow", "the arm").is_ok());
         let unanswered = RosError::Network { what: "/follow".to_owned(), why: "no answer".to_owned() };
         let lost = |why: &str| RobotError::Lost { peer: "the arm".to_owned(), why: why.to_owned() };
         for (ended, expected) in [
@@ -458,7 +456,7 @@ mod tests {
                 "the cancellation of the motion was not confirmed: /follow: no answer; the arm may still move",
             ),
         ] {
-            let why = check_cancelled::<GoalEnd>(ended, "/follow").unwrap_err();
+            let why = check_cancelled::<GoalEnd>(ended, "/follow", "the arm").unwrap_err();
             assert_eq!(why, expected);
             let stopped = with_failed_stop(RobotError::Stopped(StopReason::Interrupted), Err(lost(&why)));
             assert_eq!(stopped.to_string(), lost(expected).to_string());
@@ -468,6 +466,11 @@ mod tests {
             assert!(reflex.latches() && reflex.to_string().contains("contact; "), "{reflex}");
             assert!(reflex.to_string().ends_with(expected), "{reflex}");
         }
+        let why = check_cancelled::<GoalEnd>(Ok(None), "/grip", "the fingers").unwrap_err();
+        assert!(
+            why.starts_with("/grip did not end the motion") && why.ends_with("the fingers may still move"),
+            "{why}"
+        );
         let stopped = with_failed_stop(lost("no joint states"), Ok(()));
         assert_eq!(stopped.to_string(), lost("no joint states").to_string());
     }

@@ -19,9 +19,9 @@ use crate::shared_args::TaughtCameraArgs;
 /// `sdg annotate`
 #[derive(Debug, ClapArgs)]
 pub struct AnnotateArgs {
-    /// Photos of one part (PNG, JPEG, WebP, BMP, TIFF). Marks are read from and written to the file of the same name
-    /// with .json, or to ANNOTATION; files of other tools are read and never changed. With --from, an IMAGE that does
-    /// not exist yet names the photo to be taken.
+    /// Photos of one part (PNG, JPEG, WebP, BMP, TIFF). Marks are read from the file beside the photo as by sdg teach,
+    /// or from ANNOTATION, and written to the file of the photo's name with .json, or to ANNOTATION; files of other
+    /// tools are read and never changed. With --from, an IMAGE that does not exist yet names the photo to be taken.
     ///
     /// A photo is reopened in its last state, with its versions of the model, corrections and tried pictures, as
     /// recorded in IMAGE.sdg-project.json beside it; other files of its folder are ignored.

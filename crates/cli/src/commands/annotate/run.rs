@@ -84,7 +84,11 @@ fn open(
     let open_camera = || {
         let Some((from, photo_path)) = args.from.clone().zip(photo_path.clone()) else { return Ok(None) };
         let address = sdg_annotate::paced(from);
-        let camera = live_pictures::open(&address, &teacher.open_options(args.request.options()))?;
+        if let Some((camera, _)) = &teacher.camera {
+            args.request.check_size(camera.size_px(), "of the calibration")?;
+        }
+        let options = args.request.options(&address)?;
+        let camera = live_pictures::open(&address, &teacher.open_options(options))?;
         Ok(Some(teacher.live(camera, &address, photo_path)))
     };
     let report = &mut |line: &str| eprintln!("{line}");

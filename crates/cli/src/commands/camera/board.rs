@@ -9,6 +9,7 @@ use sdg_calibration::{Board, Paper, Sheet};
 
 use super::board_in_use::squares;
 use crate::exit::{Outcome, Usage};
+use crate::output_paths::check_ending;
 
 /// `sdg camera board`
 #[derive(Debug, Args)]
@@ -50,6 +51,8 @@ impl From<PaperName> for Paper {
 
 /// Writes the sheet.
 pub fn run(args: &BoardArgs) -> Result<Outcome> {
+    check_ending("--out", &args.out, "svg")?;
+    args.pdf.as_deref().map_or(Ok(()), |pdf| check_ending("--pdf", pdf, "pdf"))?;
     let (paper, [columns, rows]) = (Paper::from(args.paper), args.squares);
     let laid_out = || {
         let square_m = match args.square_mm {

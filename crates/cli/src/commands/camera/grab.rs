@@ -14,6 +14,7 @@ use serde_json::json;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{LiveArgs, next_frame, open};
+use crate::output_paths::prepare_new_folder;
 
 /// `sdg camera grab`
 #[derive(Debug, Args)]
@@ -30,7 +31,7 @@ pub struct GrabArgs {
     /// Seconds between frames; default: no wait
     #[arg(long, value_name = "SECS", default_value_t = 0.0)]
     pub every: f64,
-    /// A PNG file for one frame; a folder, created if missing, for several
+    /// A new PNG file for one frame; a new or empty folder for several
     #[arg(long, value_name = "FILE|FOLDER")]
     pub out: PathBuf,
     /// Print a JSON object for each frame
@@ -50,17 +51,27 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
             let found = args.out.display();
             return Err(Usage(format!("--out: expected a file that ends in .png, or a folder, found {found}")).into());
         }
+        if std::fs::metadata(&args.out).is_ok_and(|file| file.len() > 0) {
+            let found = args.out.display();
+            return Err(Usage(format!("--out: expected a new name, found the existing file {found}")).into());
+        }
         sdg_files::check_writable(&args.out)?;
     } else {
-        std::fs::create_dir_all(&args.out)
-            .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
+        prepare_new_folder("--out", &args.out)?;
+        // With `follow`, every written frame would be the next one to read.
+        if let Address::Folder { path, .. } = &args.live.from
+            && sdg_files::is_same_file(path, &args.out)
+        {
+            let found = args.out.display();
+            return Err(Usage(format!("--out: expected another folder than that of --from, found {found}")).into());
+        }
     }
     let calibrated = args.camera.as_deref().map(camera_files::read).transpose()?.map(|(camera, _)| camera);
     if let Address::File { path, .. } | Address::Folder { path, .. } = &args.live.from {
         sdg_files::keep(path);
     }
     let interrupt = Interrupt::watch();
-    let mut camera = open(&args.live.from, &options(&args.live, calibrated.as_ref()))?;
+    let mut camera = open(&args.live.from, &options(&args.live, calibrated.as_ref())?)?;
     // A live camera delivers frames during the wait: the newest frame is taken, and older ones are dropped.
     if args.every > 0.0 && args.live.from.is_live() {
         camera = Box::new(LatestFrame::spawn(camera));
@@ -96,15 +107,15 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
 }
 
 /// The settings of the camera; those of a calibrated camera give its size and the pixels that were calibrated.
-fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> OpenOptions {
-    let mut options = live.options();
+fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> Result<OpenOptions, Usage> {
+    let mut options = live.options()?;
     if let Some(calibrated) = calibrated {
         options.frame = PixelFrame::Sensor;
         if live.request.size.is_none() {
             (options.width, options.height) = (calibrated.intrinsics.width, calibrated.intrinsics.height);
         }
     }
-    options
+    Ok(options)
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

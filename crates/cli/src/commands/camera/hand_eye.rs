@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, ValueEnum};
 use sdg_calibration::{CalibrationError, HandEye, RobotPose, calibrate_hand_eye};
+use sdg_cell::without_minus_zero;
 use sdg_geometry::{Mount, upper_median};
 use sdg_inputs::{camera_files, robot_poses};
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, named};
 use crate::exit::{Outcome, one_line};
+use crate::shared_args::table_height_mm;
 
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
@@ -100,12 +102,6 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Parses the table's z, which can be any finite number: the camera's height above it is checked later.
-fn table_height_mm(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| format!("expected the table's z in millimetres, found {text}"))
-}
-
 /// Adds the option that corrects the error.
 fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
     match error {
@@ -130,8 +126,9 @@ fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose]
     let median = upper_median(found.pictures_rms_px.iter().copied()).context("no picture was used")?;
     let [spread_m, spread_rad] = found.max_spread();
     let (spread_mm, spread_deg) = (1000.0 * spread_m, spread_rad.to_degrees());
-    let [x, y, z]: [f64; 3] = (found.frame_from_camera.translation.vector * 1000.0).into();
-    let [i, j, k, w]: [f64; 4] = found.frame_from_camera.rotation.coords.into();
+    let pose = &found.frame_from_camera;
+    let [x, y, z]: [f64; 3] = pose.translation.vector.map(|length| without_minus_zero(length * 1000.0, 2)).into();
+    let [i, j, k, w]: [f64; 4] = pose.rotation.coords.map(|coordinate| without_minus_zero(coordinate, 5)).into();
     writeln!(
         stdout,
         "{frame}_from_camera: ({x:.2}, {y:.2}, {z:.2}) mm, rotation_xyzw ({i:.5}, {j:.5}, {k:.5}, {w:.5})"

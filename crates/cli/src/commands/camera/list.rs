@@ -54,7 +54,8 @@ pub fn run(args: &ListArgs) -> Result<Outcome> {
 fn json_format(format: &Format) -> Value {
     let sizes = match &format.sizes {
         Sizes::Listed(sizes) => {
-            let rates = format.max_fps.iter().copied().chain(std::iter::repeat(0.0));
+            // 0 is a rate that the driver does not give.
+            let rates = format.max_fps.iter().map(|&fps| (fps > 0.0).then_some(fps)).chain(std::iter::repeat(None));
             json!(
                 sizes
                     .iter()
@@ -72,5 +73,25 @@ fn in_words(sizes: &Sizes) -> String {
     match sizes {
         Sizes::Listed(sizes) => sizes.iter().map(|(w, h)| format!("{w}x{h}")).collect::<Vec<_>>().join(" "),
         Sizes::Range { min, max } => format!("{}x{} to {}x{}", min.0, min.1, max.0, max.1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_camera::Encoding;
+
+    #[test]
+    fn a_rate_that_the_driver_does_not_give_is_null() {
+        let format = Format {
+            fourcc: "YUYV".to_owned(),
+            description: "YUYV 4:2:2".to_owned(),
+            encoding: Some(Encoding::Yuyv),
+            sizes: Sizes::Listed(vec![(640, 480), (320, 240), (160, 120)]),
+            max_fps: vec![30.0, 0.0],
+        };
+        let printed = json_format(&format);
+        let rates = [0_usize, 1, 2].map(|idx| printed["sizes"][idx]["max_fps"].clone());
+        assert_eq!(rates, [json!(30.0), Value::Null, Value::Null]);
     }
 }

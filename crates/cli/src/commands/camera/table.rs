@@ -10,12 +10,13 @@ use sdg_calibration::{
     ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPlacement, SheetPose, UNCALIBRATED,
     bent_px, focal_cost, guess_camera, locate_sheet, pose_json,
 };
+use sdg_cell::without_minus_zero;
 use sdg_inputs::{BoardPicture, camera_files};
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, named};
 use crate::exit::{Outcome, Usage};
-use crate::shared_args::height_mm;
+use crate::shared_args::{METRES, height_mm, table_height_mm};
 
 /// `sdg camera table`
 #[derive(Debug, Args)]
@@ -57,7 +58,8 @@ pub struct TableArgs {
         hide_default_value = true,
         value_name = "MM",
         requires = "sheet_in_base_mm",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        value_parser = table_height_mm
     )]
     table_height_mm: f64,
     /// Height of the sheet's upper side above the table, if the sheet is on a plate
@@ -149,14 +151,22 @@ fn placement(args: &TableArgs) -> Result<SheetPlacement> {
         [x, y] => (Frame::Base, [x, y], args.table_height_mm),
         _ => return Err(Usage("expected --sheet-in-base-mm X,Y".to_owned()).into()),
     };
-    let values = [x, y, args.table_height_mm, thickness, args.mark_height_mm, args.sheet_yaw_deg];
+    let values = [x, y, args.table_height_mm, thickness, args.mark_height_mm];
     if let Some(value) = values.into_iter().find(|value| !(-MAX_REACH_MM..=MAX_REACH_MM).contains(value)) {
         return Err(Usage(format!("expected lengths up to {MAX_REACH_MM} mm, found {value}")).into());
+    }
+    // Within reach as metres; as millimetres, the sheet would lie under the robot.
+    if [x, y] != [0.0; 2] && [x, y].iter().all(|value| value.abs() <= 1e-3 * MAX_REACH_MM) {
+        return Err(Usage(format!("--sheet-in-base-mm: expected X,Y in mm, found {x},{y}{METRES}")).into());
+    }
+    let yaw_deg = args.sheet_yaw_deg;
+    if !(-360.0..=360.0).contains(&yaw_deg) {
+        return Err(Usage(format!("--sheet-yaw-deg: expected -360 to 360 degrees, found {yaw_deg}")).into());
     }
     Ok(SheetPlacement {
         frame,
         origin_m: Vector3::new(x, y, args.table_height_mm + thickness) / 1000.0,
-        yaw_rad: args.sheet_yaw_deg.to_radians(),
+        yaw_rad: yaw_deg.to_radians(),
         table_height_m: height_mm / 1000.0,
     })
 }
@@ -193,7 +203,7 @@ fn report(
         writeln!(stdout, "{object}")?;
         return Ok(());
     }
-    let [x, y, z]: [f64; 3] = (pose.translation.vector * 1000.0).into();
+    let [x, y, z]: [f64; 3] = pose.translation.vector.map(|length| without_minus_zero(length * 1000.0, 1)).into();
     writeln!(
         stdout,
         "{}: camera at {frame} ({x:.1}, {y:.1}, {z:.1}) mm, {:.1} degrees from straight down",

@@ -7,17 +7,16 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use sdg_calibration::{Board, BoardSession, CalibrationConfig};
 use sdg_camera::{Address, Frame, LatestFrame, MjpegServer, PixelFrame};
 use sdg_cell::draw_board_session;
 use sdg_inputs::BoardPicture;
 
-use super::board_in_use::named;
-use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{self, RequestArgs, next_frame};
+use crate::output_paths::prepare_new_folder;
 use crate::web_browser;
 
 /// Default folder of the pictures.
@@ -69,14 +68,10 @@ impl TakingArgs {
         board: &Board,
         config: impl Fn((u32, u32)) -> CalibrationConfig,
     ) -> Result<Vec<BoardPicture>> {
-        let folder = self.taken.as_deref().unwrap_or(Path::new(DEFAULT_FOLDER));
-        sdg_files::prepare_folder(folder)?;
-        if std::fs::read_dir(folder).with_context(|| named(folder))?.next().is_some() {
-            let found = folder.display();
-            return Err(Usage(format!("--taken: expected a new or an empty folder, found files in {found}")).into());
-        }
-        let mut options = self.request.options();
+        let mut options = self.request.options(address)?;
         options.frame = PixelFrame::Sensor;
+        let folder = self.taken.as_deref().unwrap_or(Path::new(DEFAULT_FOLDER));
+        prepare_new_folder("--taken", folder)?;
         let mut camera = live_pictures::open(address, &options)?;
         let is_live = address.is_live();
         if is_live {

@@ -37,7 +37,7 @@ pub fn run(args: &WatchArgs) -> Result<Outcome> {
         limit => limit.map(Duration::from_secs_f64),
     };
     let interrupt = Interrupt::watch();
-    let mut camera = open(&args.live.from, &args.live.options())?;
+    let mut camera = open(&args.live.from, &args.live.options()?)?;
     let start = Instant::now();
     let mut period = FrameStatistics::begin();
     let mut num_frames = 0_u64;
@@ -78,9 +78,10 @@ fn print(period: &FrameStatistics, start: Instant, is_json: bool) -> Result<()> 
             .iter()
             .map(|(name, (count, text))| json!({"name": name, "count": count, "last": text}))
             .collect();
+        let (width, height) = (period.num_frames > 0).then_some(period.size).unzip();
         let told = json!({
-            "seconds": seconds, "frames": period.num_frames, "fps": fps, "missed": period.num_missed, "width": period.size.0,
-            "height": period.size.1, "brightness": brightness, "faults": faults,
+            "seconds": seconds, "frames": period.num_frames, "fps": fps, "missed": period.num_missed, "width": width,
+            "height": height, "brightness": brightness, "faults": faults,
         });
         writeln!(stdout, "{told}")?;
     } else {

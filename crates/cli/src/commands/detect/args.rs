@@ -49,18 +49,20 @@ pub struct DetectArgs {
     /// half of its area are in the region
     #[arg(long, value_name = "X,Y,W,H|all", allow_hyphen_values = true, value_parser = region_or_all)]
     pub region: Option<RegionArg>,
-    /// Minimum score of accepted detections; a higher value gives fewer wrong and more missed parts
+    /// Minimum score of accepted detections; a higher value gives fewer wrong and more missed parts. Not for tracked
+    /// parts: with --from, it needs --every-frame
     #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]
     pub min_score: f64,
-    /// Also list refused detections, with the reasons
+    /// Also list refused detections, with the reasons; with --from, lost parts, or refused detections with
+    /// --every-frame
     #[arg(long)]
     pub all: bool,
     /// Print one JSON line per image
     #[arg(long)]
     pub json: bool,
     /// Write each image with its grasps to this folder; refused detections show marks where edges, surface and features
-    /// differ from the photo. With --from, serve the pictures to browsers at this port of 127.0.0.1 instead (0: any
-    /// free port)
+    /// differ from the photo, except with --camera and under a slanted camera. With --from, serve the pictures to
+    /// browsers at this port of 127.0.0.1 instead (0: any free port)
     #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
     /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of images, or - for one image from standard input

@@ -15,7 +15,7 @@ use sdg_camera::{Address, Fault, Frame, MjpegServer};
 use sdg_cell::{
     DetectionWords, FrameDetector, FrameRecord, FrameSize, FrameSizes, Frames, Next, Part, Perception, drawing,
 };
-use sdg_grasp::{GraspDetection, TrackerConfig, Verification};
+use sdg_grasp::{GraspDetection, TrackerConfig};
 
 use super::args::DetectArgs;
 use crate::exit::{Outcome, Usage, one_line};
@@ -24,6 +24,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
 use crate::paint::{Paint, Tone};
+use crate::shared_args::verification;
 
 /// Reads frames until the camera ends, `--frames` are read or Ctrl-C is pressed.
 pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result<Outcome> {
@@ -41,7 +42,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         }
     };
     let mut frames = open(args, address, &detector)?;
-    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
+    let verification = verification(args.no_verify, detector.model());
     let mut tracking = TrackerConfig::DEFAULT;
     tracking.max_parts = args.max as usize;
     let tracking = (!args.every_frame && !args.no_verify).then_some(tracking);
@@ -112,18 +113,15 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
 
 /// Opens the camera with the size of its calibration, or of the model's region.
 fn open(args: &DetectArgs, address: &Address, detector: &Perception) -> Result<Frames> {
-    let mut options = args.request.options();
-    options.frame = detector.pixel_frame();
     let of_region = detector.region().and_then(|region| region.picture);
-    if let Some([width, height]) = detector.picture_size().or(of_region) {
-        if let Some(asked) = args.request.size.filter(|&asked| asked != (width, height)) {
-            let whose = if detector.picture_size().is_some() { "of the calibration" } else { "of the region" };
-            return Err(Usage(format!(
-                "--size: expected {width}x{height}, the size {whose}, found {}x{}",
-                asked.0, asked.1
-            ))
-            .into());
-        }
+    let size = detector.picture_size().or(of_region);
+    if let Some(size) = size {
+        let whose = if detector.picture_size().is_some() { "of the calibration" } else { "of the region" };
+        args.request.check_size(size, whose)?;
+    }
+    let mut options = args.request.options(address)?;
+    options.frame = detector.pixel_frame();
+    if let Some([width, height]) = size {
         (options.width, options.height) = (width, height);
     }
     Ok(Frames::of(live_pictures::open(address, &options)?, address))
@@ -138,7 +136,8 @@ fn write_line(
     seconds: f64,
     parts: &[Part],
 ) -> Result<()> {
-    let shown: Vec<&Part> = parts.iter().filter(|part| args.all || part.is_seen(args.min_score)).collect();
+    let mut shown: Vec<&Part> = parts.iter().filter(|part| args.all || part.is_seen(args.min_score)).collect();
+    shown.sort_by(|one, other| one.by_score(other));
     let words = DetectionWords { detector, picture_size: [width, height], min_score: args.min_score };
     let text = FoundText { words, paint: Paint::stdout() };
     let detections: Vec<&GraspDetection> = shown.iter().map(|part| &part.found.detection).collect();
@@ -184,7 +183,7 @@ mod tests {
     use clap::Parser;
     use nalgebra::Vector2;
     use sdg_evaluation::shipped;
-    use sdg_grasp::{ModelKind, TeachOptions, TrackState, teach};
+    use sdg_grasp::{ModelKind, TeachOptions, TrackState, Verification, teach};
     use serde_json::Value;
 
     use super::*;
@@ -213,7 +212,7 @@ mod tests {
         let printed = |state: TrackState, form: &str| {
             let line = ["sdg", "detect", "--grasp-model", "m", "--from", "v4l:", "--all", form];
             let Command::Detect(args) = Args::try_parse_from(line).unwrap().command else { panic!("another command") };
-            let parts = [part(0, [0.0, 0.0], 0.9, state), part(1, [59.0, -6.0], 0.4, TrackState::Followed)];
+            let parts = [part(1, [59.0, -6.0], 0.4, TrackState::Followed), part(0, [0.0, 0.0], 0.9, state)];
             let frame = Frame::new(RgbImage::new(1, 1), 0, "v4l:".into());
             let mut out = Vec::new();
             write_line(&mut out, &args, &perception, &frame, picture.dimensions(), 0.0, &parts).unwrap();
@@ -221,6 +220,8 @@ mod tests {
         };
         let touched = |state: TrackState| {
             let line: Value = serde_json::from_str(&printed(state, "--json")).unwrap();
+            // The best part comes first, whatever the number of its track.
+            assert_eq!([0_usize, 1].map(|idx| line["detections"][idx]["track"].clone()), [0, 1]);
             [0_usize, 1].map(|idx| line["detections"][idx]["jaws_touch"].clone())
         };
         assert_eq!(touched(TrackState::Followed)[0], serde_json::json!([1]));

@@ -4,14 +4,13 @@ mod args;
 mod inputs;
 mod live;
 
-use std::collections::BTreeSet;
 use std::io::Write;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Perception, SearchedPicture};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
-use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument};
+use sdg_inputs::{DrawnNames, PictureInput, PictureInputs, camera_files, pictures_of_argument};
 use serde::Serialize;
 
 pub use args::DetectArgs;
@@ -21,7 +20,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::{FoundText, advice_with_options};
 use crate::json_line::json_line;
 use crate::paint::{Paint, Tone};
-use crate::shared_args::RegionArg;
+use crate::shared_args::{RegionArg, verification};
 
 /// Prints the detections in each image. For an image that cannot be used, reports the error and continues.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
@@ -63,8 +62,9 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     let mut batch = Batch {
         args,
         detector: &detector,
+        verification: verification(args.no_verify, detector.model()),
         stdout: std::io::stdout().lock(),
-        drawn: BTreeSet::new(),
+        drawn: DrawnNames::of([]),
         num_used: 0,
         num_failed: 0,
         is_alone: false,
@@ -76,8 +76,10 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     let num_pictures = |inputs: &Result<PictureInputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
     batch.is_alone = inputs.iter().map(|(_, inputs)| num_pictures(inputs)).sum::<usize>() == 1;
     if let Some(folder) = &args.draw {
-        let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
-        inputs::check_drawn_elsewhere(folder, pictures)?;
+        let read = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok());
+        let pictures = read.flat_map(|inputs| &inputs.pictures);
+        inputs::check_drawn_elsewhere(folder, pictures.clone())?;
+        batch.drawn = DrawnNames::of(pictures);
         sdg_files::prepare_folder(folder)?;
     }
     for (argument, inputs) in inputs {
@@ -105,9 +107,10 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
 struct Batch<'a, W> {
     args: &'a DetectArgs,
     detector: &'a Perception,
+    verification: Verification,
     stdout: W,
-    /// File names of the drawings written so far.
-    drawn: BTreeSet<String>,
+    /// File names of the drawings.
+    drawn: DrawnNames,
     num_used: usize,
     num_failed: usize,
     /// Whether this run has only one picture.
@@ -167,15 +170,14 @@ impl<'a, W: Write> Batch<'a, W> {
     }
 
     fn detect(&mut self, input: &PictureInput) -> Result<SearchedPicture> {
-        let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
         let mut image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
-        let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
+        let detections = self.detector.detect(&image, self.verification).with_context(|| input.name())?;
         let seconds = start.elapsed().as_secs_f64();
         let seen = SearchedPicture { size: image.dimensions().into(), seconds, detections };
         if let Some(folder) = &self.args.draw {
             seen.draw(&mut image, &self.text(&seen).words);
-            sdg_files::write_drawing(&folder.join(input.drawn_name(&mut self.drawn)), &image)?;
+            sdg_files::write_drawing(&folder.join(self.drawn.name_of(input)), &image)?;
         }
         Ok(seen)
     }

@@ -28,8 +28,8 @@ Labelled pictures (--pictures DIR):
   pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
   pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
   seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
-  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_kind [{kind, found, parts, wrong,
-  false_alarms, pictures_without_part}] if truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report;
+  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`, in pixels}]}]; by_kind [{kind, found, parts, wrong,
+  false_alarms, pictures_without_part}], empty unless truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report;
   label_offset {agreeing {count, of}, along_percent, across_percent, px, turn_deg, totals}, if the labels mark another grasp on the part.
   The exit code is 3 if parts are marked and nothing was detected.";
 

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, TestedFolder, Totals, page, summary, to_json};
 use sdg_evaluation::quoted;
-use sdg_grasp::Verification;
 use sdg_inputs::camera_files;
 
 use super::args::EvaluateArgs;
@@ -13,7 +12,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
-use crate::shared_args::ComputeArgs;
+use crate::shared_args::{ComputeArgs, verification};
 
 /// Default folder of the page, outside the folder of the user's pictures.
 const DEFAULT_REPORT: &str = "target/pictures-report";
@@ -29,10 +28,17 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
+    if let Some(label) = &labelled.foreign_label {
+        let object = model.object();
+        eprintln!(
+            "all labels are `{label}`, the model's part is `{object}`: they count as the part; --label {object} counts \
+             the pictures as without it"
+        );
+    }
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     sdg_files::prepare_folder(&report_folder)?;
 
-    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
+    let verification = verification(args.no_verify, model);
     let progress = EvaluationProgress::new();
     let TestedFolder { tested, left_out, others } =
         labelled.test(&detector, verification, args.min_score, &progress)?;

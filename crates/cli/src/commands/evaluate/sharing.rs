@@ -185,18 +185,20 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
             println!("{}", serde_json::to_string(&progress)?);
             return Ok(Outcome::Done);
         }
+        // Not by the macros, whose errors are returned after the last unit.
+        let mut stdout = std::io::stdout();
         let screen = progress.to_string();
         let line = screen.lines().next().unwrap_or_default();
         if is_terminal {
             // Redraws from the upper left corner, and clears the rest.
-            print!("\x1b[H\x1b[J{screen}");
+            write!(stdout, "\x1b[H\x1b[J{screen}")?;
         } else if progress.is_settled {
-            print!("{screen}");
+            write!(stdout, "{screen}")?;
         } else if line.split(';').next() != told.split(';').next() {
-            println!("{line}");
+            writeln!(stdout, "{line}")?;
         }
         line.clone_into(&mut told);
-        std::io::stdout().flush()?;
+        stdout.flush()?;
         if progress.is_settled {
             return match progress.units - progress.done {
                 0 => Ok(Outcome::Done),

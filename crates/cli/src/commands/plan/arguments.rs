@@ -4,9 +4,9 @@ use std::f64::consts::FRAC_PI_4;
 use std::str::FromStr;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use sdg_kinematics::{HAND_OPENING_MAX_M, JointVector, NUM_JOINTS};
+use sdg_kinematics::{JointVector, NUM_JOINTS};
 
-use crate::shared_args::millimetres;
+use crate::shared_args::{METRES, millimetres};
 
 /// `--start`: joint angles, given in degrees.
 #[derive(Debug, Clone, Copy)]
@@ -21,11 +21,6 @@ pub struct GoalPose(pub Isometry3<f64>);
 pub struct Held {
     pub diameter_m: f64,
     pub length_m: f64,
-}
-
-/// `--opening-mm`.
-pub fn opening_mm(text: &str) -> Result<f64, String> {
-    millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
 }
 
 /// `--margin-mm`. At most 100 mm, because no workcell has room for a larger distance.
@@ -60,7 +55,7 @@ impl FromStr for GoalPose {
             }
         };
         if [x, y, z].iter().all(|value| value.abs() < MIN_DISTANCE_MM) {
-            return Err(format!("expected X,Y,Z in mm, found {x},{y},{z}: metres given as millimetres?"));
+            return Err(format!("expected X,Y,Z in mm, found {x},{y},{z}{METRES}"));
         }
         let given = &numbers[3..];
         if are_radians(given) {
@@ -140,7 +135,6 @@ mod tests {
         assert!("30,0".parse::<Held>().is_err() && "30".parse::<Held>().is_err());
         assert!("0.03,0.1".parse::<Held>().unwrap_err().contains("metres given as millimetres?"));
         assert!(margin_mm("0.003").unwrap_err().contains("metres given as millimetres?") && margin_mm("3") == Ok(3.0));
-        assert!(opening_mm("0.08").unwrap_err().contains("metres given as millimetres?") && opening_mm("81").is_err());
         assert!((("30,100".parse::<Held>().unwrap()).diameter_m - 0.03).abs() < 1e-12);
     }
 }

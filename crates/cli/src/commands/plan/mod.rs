@@ -16,8 +16,9 @@ use sdg_robot::DEFAULT_SPEED;
 use sdg_robot::workcell::Workcell;
 
 use crate::exit::{Outcome, Usage};
-use crate::json_line::json_line;
+use crate::json_line::{json_line, tell};
 use crate::robots;
+use crate::shared_args::opening_mm;
 use arguments::{GoalPose, Held, JointsDeg};
 
 /// `sdg plan`
@@ -43,7 +44,7 @@ pub struct PlanArgs {
     #[arg(long, value_name = "SIZE")]
     pub held_mm: Option<Held>,
     /// Distance between the open fingers
-    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = arguments::opening_mm)]
+    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = opening_mm)]
     pub opening_mm: f64,
     /// Minimum distance to all obstacles
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = arguments::margin_mm)]
@@ -68,6 +69,10 @@ pub struct PlanArgs {
 /// Plans a motion, prints it and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
+    // An output path that is not a folder is reported before the work; the folder is created when there is a drawing.
+    if !args.no_drawing && args.out.exists() {
+        sdg_files::prepare_folder(&args.out)?;
+    }
     let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     let mut model = workcell.collision_model(args.opening_mm * 1e-3).map_err(|error| Usage(error.to_string()))?;
     if let Some(Held { diameter_m, length_m }) = args.held_mm {
@@ -97,9 +102,9 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let motions = plan.trajectories(&joints, &tcp, &dynamics)?;
     let stopping_secs = plan.stopping_secs(&joints, &tcp, &dynamics)?;
     let explained = ExplainedPlan::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
-    eprint!("{}", explained.text());
+    tell(args.json, explained.text().trim_end());
     if let Some(refused) = refused_by_limits(&workcell, &motions) {
-        eprintln!("  sdg grasp would reject it: {refused}");
+        tell(args.json, &format!("  sdg grasp would reject it: {refused}"));
     }
     if args.json {
         println!("{}", json_line(&explained.json())?);
@@ -118,7 +123,7 @@ fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<
         return Ok(());
     }
     for file in sdg_evaluation::draw_motions(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
-        eprintln!("  {}", file.display());
+        tell(args.json, &format!("  {}", file.display()));
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, RehearsedPlace};
 use sdg_evaluation::run_page::{self, RunPage};
 use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes, attempt_in_words, quoted, run_json};
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{GraspError, GraspModel, Verification};
+use sdg_grasp::{GraspError, GraspModel};
 use sdg_inputs::camera_files::CameraFile;
 use sdg_report::AttemptSummary;
 
@@ -19,7 +19,7 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::parts::part_named;
 use crate::robots;
-use crate::shared_args::OwnPartArgs;
+use crate::shared_args::{OwnPartArgs, verification};
 
 /// Runs the attempts and writes the report; after Ctrl-C, the report of the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
@@ -46,7 +46,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         _ => None,
     };
     sdg_files::prepare_folder(&args.out)?;
-    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
+    let verification = verification(args.no_verify, &model);
     let rehearsal = Rehearsal {
         model: &model,
         object: &object,
@@ -153,6 +153,9 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         }
         let done = if rehearsed.is_placing { "placed" } else { "grasped" };
         println!("{done} it in {} of {} attempts", rehearsed.successes(), rehearsed.attempts.len());
+        if let Some(told) = rehearsed.interruption() {
+            println!("{told}");
+        }
         println!("report: {}", report.display());
     }
     Ok(if rehearsed.found_nothing() { Outcome::NothingToGrasp } else { Outcome::Done })

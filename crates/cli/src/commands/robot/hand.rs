@@ -11,6 +11,7 @@ use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, write_states};
+use crate::shared_args::opening_mm;
 
 /// Speed of the fingers relative to each other, in m/s.
 const SPEED_M_S: f64 = 0.05;
@@ -28,7 +29,7 @@ pub struct OpenArgs {
     #[command(flatten)]
     arm: ArmArgs,
     /// Distance between the fingers, 0 to 80
-    #[arg(long, value_name = "MM", default_value_t = 80.0)]
+    #[arg(long, value_name = "MM", default_value_t = 80.0, value_parser = opening_mm)]
     width_mm: f64,
     /// File for the arm's last second of states after an error, as CSV
     #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
@@ -49,16 +50,12 @@ pub struct CloseArgs {
 }
 
 pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
-    let opening_m = args.width_mm * 1e-3;
-    if !(0.0..=HAND_OPENING_MAX_M).contains(&opening_m) {
-        let found = args.width_mm;
-        return Err(Usage(format!("--width-mm: expected 0 to {:.0}, found {found}", HAND_OPENING_MAX_M * 1e3)).into());
-    }
     let (mut arm, _) = args.arm.connect()?;
-    let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S }, &args.states)?;
+    let to = HandCommand::Move { opening_m: args.width_mm * 1e-3, speed_m_s: SPEED_M_S };
+    let hand = command(&mut arm, to, &args.states)?;
     // The hand no longer holds an object.
     arm.set_load(Load::NONE)?;
-    eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
+    println!("the hand is {:.1} mm open", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 
@@ -75,7 +72,7 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     };
     let hand = command(&mut arm, close, &args.states)?;
     let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
-    eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
+    println!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 

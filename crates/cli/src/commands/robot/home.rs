@@ -8,7 +8,7 @@ use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::{Trajectory, ready_pose};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, ContactSensitivity, DEFAULT_SPEED, Destination, FREE_CLEARANCE_M, FrankaArm, Pace, Robot, RobotError,
+    Arm, ContactSensitivity, DEFAULT_SPEED, Destination, FREE_CLEARANCE_M, FrankaArm, Load, Pace, Robot, RobotError,
     SafetyLimits, Surroundings,
 };
 
@@ -60,8 +60,8 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     arm.check_model(workcell.robot)?;
     let interrupt = Interrupt::watch();
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
-    let ascent = robot.plan_ascent(ASCENT_M, &pace.approach_limits(&workcell.robot.geometry()))?;
-    if let Some(ascent) = ascent {
+    let is_holding = robot.hand()?.is_grasping;
+    if let Some(ascent) = plan_ascent(&mut robot, &workcell, &pace, is_holding)? {
         let (secs, up_mm) = (ascent.duration_secs(), ASCENT_M * 1e3);
         let question = format!(
             "The arm at {address} is lower than the limits allow: first move it {up_mm:.0} mm straight up, in {secs:.1} s?"
@@ -70,11 +70,12 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
             return Ok(Outcome::Done);
         }
         eprintln!("moving straight up, {secs:.1} s; Ctrl-C stops the arm");
-        move_along(&mut robot, vec![ascent], &args.states)?;
+        move_along(&mut robot, load(&workcell, is_holding), vec![ascent], &args.states)?;
     }
-    let motions = plan(&mut robot, &workcell, &pace)?;
+    let is_holding = robot.hand()?.is_grasping;
+    let motions = plan(&mut robot, &workcell, &pace, is_holding)?;
     if motions.iter().all(|motion| motion.duration_secs() <= 0.0) {
-        eprintln!("the arm at {address} is at home");
+        println!("the arm at {address} is at home");
         return Ok(Outcome::Done);
     }
     let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
@@ -82,26 +83,66 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     eprintln!("moving home, {secs:.1} s; Ctrl-C stops the arm");
-    move_along(&mut robot, motions, &args.states)?;
+    move_along(&mut robot, load(&workcell, is_holding), motions, &args.states)?;
     Ok(Outcome::Done)
 }
 
 /// Follows motions, and writes the arm's last second of states after an error.
-fn move_along<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>, states: &Path) -> Result<()> {
-    let moved = follow(robot, motions);
+fn move_along<A: Arm>(
+    robot: &mut Robot<'_, A>,
+    load: Option<Load>,
+    motions: Vec<Trajectory>,
+    states: &Path,
+) -> Result<()> {
+    let moved = follow(robot, load, motions);
     if moved.is_err() {
         write_states(states, robot.watch())?;
     }
     Ok(moved?)
 }
 
-/// The motions home, which are checked before the question is asked. The controller gets the load of a held part, with
-/// which the torques are computed.
-fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> Result<Vec<Trajectory>> {
+/// The load of the hand; `None` if the hand holds a part of unknown mass.
+fn load(workcell: &Workcell, is_holding: bool) -> Option<Load> {
+    if is_holding { workcell.grasp_config().load } else { Some(Load::NONE) }
+}
+
+/// A ball that contains the held part, whose pose in the hand is not known.
+fn part(workcell: &Workcell, is_holding: bool) -> Vec<Capsule> {
+    if is_holding { vec![Capsule::new([0.0; 3], [0.0; 3], workcell.part_radius_m)] } else { Vec::new() }
+}
+
+fn surroundings<'s>(workcell: &'s Workcell, part: &'s [Capsule]) -> Surroundings<'s> {
+    Surroundings {
+        obstacles: &workcell.obstacles,
+        held: part,
+        may_start_near: true,
+        table_clearance_m: FREE_CLEARANCE_M,
+        ..Surroundings::default()
+    }
+}
+
+/// The motion up of an arm that is lower than the limits allow, checked before the question is asked.
+fn plan_ascent<A: Arm>(
+    robot: &mut Robot<'_, A>,
+    workcell: &Workcell,
+    pace: &Pace,
+    is_holding: bool,
+) -> sdg_robot::Result<Option<Trajectory>> {
+    let (part, limits) = (part(workcell, is_holding), pace.approach_limits(robot.geometry()));
+    robot.plan_ascent(&surroundings(workcell, &part), ASCENT_M, &limits)
+}
+
+/// The motions home, which are checked before the question is asked. The torques are computed with the load of a held
+/// part.
+fn plan<A: Arm>(
+    robot: &mut Robot<'_, A>,
+    workcell: &Workcell,
+    pace: &Pace,
+    is_holding: bool,
+) -> Result<Vec<Trajectory>> {
     let home = workcell.home().unwrap_or_else(ready_pose);
-    let is_holding = robot.hand()?.is_grasping;
-    if is_holding && let Some(load) = workcell.grasp_config().load {
-        robot.set_load(load)?;
+    if let Some(load) = load(workcell, is_holding) {
+        robot.plan_with_load(load);
     }
     let joints = match is_holding {
         true => pace.carry_limits(robot.geometry()),
@@ -113,15 +154,8 @@ fn plan<A: Arm>(robot: &mut Robot<'_, A>, workcell: &Workcell, pace: &Pace) -> R
         check_height(&motion, robot.limits(), if is_holding { workcell.part_radius_m } else { 0.0 })?;
         return Ok(vec![motion]);
     }
-    let part = [Capsule::new([0.0; 3], [0.0; 3], workcell.part_radius_m)];
-    let surroundings = Surroundings {
-        obstacles: &workcell.obstacles,
-        held: if is_holding { &part[..] } else { &[] },
-        may_start_near: true,
-        table_clearance_m: FREE_CLEARANCE_M,
-        ..Surroundings::default()
-    };
-    Ok(robot.plan_around(&surroundings, &Destination::Configuration(&home), &joints)?.motions)
+    let part = part(workcell, is_holding);
+    Ok(robot.plan_around(&surroundings(workcell, &part), &Destination::Configuration(&home), &joints)?.motions)
 }
 
 /// Fails if a motion from above the minimum height of free motions passes below it. From a lower start, for example
@@ -140,7 +174,9 @@ fn check_height(motion: &Trajectory, limits: &SafetyLimits, held_m: f64) -> Resu
     Ok(())
 }
 
-fn follow<A: Arm>(robot: &mut Robot<'_, A>, motions: Vec<Trajectory>) -> sdg_robot::Result<()> {
+fn follow<A: Arm>(robot: &mut Robot<'_, A>, load: Option<Load>, motions: Vec<Trajectory>) -> sdg_robot::Result<()> {
+    // An earlier program may have ended before it reset the load.
+    load.map_or(Ok(()), |load| robot.set_load(load))?;
     // After a stop during a descent, the controller has the higher thresholds of contacts.
     robot.set_contact_sensitivity(ContactSensitivity::Free)?;
     motions.into_iter().try_for_each(|motion| robot.follow(motion))
@@ -152,7 +188,7 @@ mod tests {
     use sdg_kinematics::collision::{Obstacle, Shape};
     use sdg_kinematics::{ArmGeometry, IkOptions, JointLimits, JointVector};
     use sdg_robot::{
-        ArmState, CheckedMotion, HandCommand, HandState, Load, LookOut, MotionEnd, PlannedAction, PlannedArm, Watch,
+        ArmState, CheckedMotion, HandCommand, HandState, LookOut, MotionEnd, PlannedAction, PlannedArm, Watch,
     };
 
     use super::*;
@@ -219,11 +255,14 @@ mod tests {
         let mut arm = Stopped { arm, sensitivity: ContactSensitivity::Contact, load_kg: None };
         let mut robot = Robot::new(&mut arm, workcell.safety_limits(), Watch::default());
         let pace = Pace::at_speed(0.1).unwrap();
-        if let Some(ascent) = robot.plan_ascent(ASCENT_M, &pace.approach_limits(&ArmGeometry::panda()))? {
-            follow(&mut robot, vec![ascent])?;
+        if let Some(ascent) = plan_ascent(&mut robot, workcell, &pace, is_grasping)? {
+            follow(&mut robot, load(workcell, is_grasping), vec![ascent])?;
         }
-        let motions = plan(&mut robot, workcell, &pace)?;
-        follow(&mut robot, motions)?;
+        let load_kg = robot.arm().load_kg;
+        let motions = plan(&mut robot, workcell, &pace, is_grasping)?;
+        // Nothing changes before a person agrees.
+        assert_eq!(robot.arm().load_kg, load_kg);
+        follow(&mut robot, load(workcell, is_grasping), motions)?;
         Ok(arm)
     }
 
@@ -246,27 +285,41 @@ mod tests {
         let lowest_m = limits.table_height_m + limits.fingertip_beyond_tcp_m + limits.min_table_clearance_m;
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let panda = ArmGeometry::panda();
-        let from = |below_m: f64| {
+        let from = |below_m: f64, workcell: &Workcell| {
             let base_from_tcp = Isometry3::from_parts(Translation3::new(0.45, 0.10, lowest_m - below_m), down);
             let q = panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).unwrap().q;
-            go_home_from(&q, &workcell, false)
+            go_home_from(&q, workcell, false)
         };
-        let arm = from(0.005).unwrap().arm;
+        let arm = from(0.005, &workcell).unwrap().arm;
         let [PlannedAction::Motion(ascent), PlannedAction::Motion(home)] = arm.actions() else {
             panic!("{:?}", arm.actions())
         };
         let [start, end] = [ascent.start(), ascent.end()].map(|q| panda.forward(q).translation.vector);
         assert!((end - start - Vector3::z() * ASCENT_M).norm() < 1e-4, "{start} {end}");
         assert!((home.end() - workcell.home().unwrap()).amax() < 1e-9);
-        let error = from(0.015).err().unwrap().to_string();
+        let error = from(0.015, &workcell).err().unwrap().to_string();
         assert!(error.starts_with("the motion was not started: "), "{error}");
+        // The top of the hand's body is 111 mm above the tcp, and the hand is 204 mm wide along y.
+        let with_lamp = |above_m: f64| {
+            let at = Translation3::new(0.45, 0.185, lowest_m - 0.005 + 0.111 + above_m + 0.01);
+            let (name, shape) = ("lamp".to_owned(), Shape::Box { half_m: [0.02, 0.01, 0.01] });
+            Workcell { obstacles: vec![Obstacle { name, shape, base_from_obstacle: at.into() }], ..workcell.clone() }
+        };
+        let error = from(0.005, &with_lamp(0.015)).err().unwrap().to_string();
+        assert!(error.contains("of the straight path up can be followed: ") && error.contains("lamp"), "{error}");
+        // The lamp touches the hand from below, 29 mm above the tcp, and the motion leads away from it.
+        let arm = from(0.005, &with_lamp(0.029 - 0.111 - 0.019)).unwrap().arm;
+        assert!(arm.actions().len() >= 2, "{:?}", arm.actions());
     }
 
     #[test]
     fn the_load_is_that_of_a_held_part() {
         let workcell = Workcell { part_mass_kg: Some(3.0), ..workcell() };
         assert_eq!(go_home(&workcell, true).unwrap().load_kg, Some(3.0));
-        assert_eq!(go_home(&workcell, false).unwrap().load_kg, None);
+        // A load that an earlier program left is reset.
+        assert_eq!(go_home(&workcell, false).unwrap().load_kg, Some(0.0));
+        let unknown = Workcell { part_mass_kg: None, ..workcell };
+        assert_eq!(go_home(&unknown, true).unwrap().load_kg, None);
     }
 
     #[test]

@@ -58,6 +58,6 @@ fn recover(args: &RecoverArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     arm.recover()?;
-    eprintln!("the arm is in mode \"{}\"", arm.state()?.mode.name());
+    println!("the arm is in mode \"{}\"", arm.state()?.mode.name());
     Ok(Outcome::Done)
 }

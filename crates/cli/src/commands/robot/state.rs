@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use sdg_calibration::pose_json;
+use sdg_cell::without_minus_zero;
 use sdg_robot::Arm;
 use serde_json::json;
 
@@ -39,9 +40,11 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
         println!("{}", json_line(&line)?);
     } else {
         println!("arm    {address}, {}", state.mode.name());
-        let joints: Vec<String> = joints_deg.iter().map(|angle| format!("{angle:.2}")).collect();
+        let joints: Vec<String> =
+            joints_deg.iter().map(|angle| format!("{:.2}", without_minus_zero(*angle, 2))).collect();
         println!("joints {} degrees", joints.join(", "));
-        println!("tcp    ({:.1}, {:.1}, {:.1}) mm", p.x * 1e3, p.y * 1e3, p.z * 1e3);
+        let [x, y, z]: [f64; 3] = p.map(|length| without_minus_zero(length * 1e3, 1)).into();
+        println!("tcp    ({x:.1}, {y:.1}, {z:.1}) mm");
         let holds = if hand.is_grasping { ", holds something" } else { "" };
         println!("hand   {:.1} mm open{holds}", hand.opening_m * 1e3);
     }

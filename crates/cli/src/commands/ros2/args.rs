@@ -6,7 +6,7 @@ use clap::Args;
 use sdg_ros2::Remapping;
 use sdg_ros2::dds::Rmw;
 
-use crate::shared_args::{ComputeArgs, ToldHeightArgs, height_mm, positive, share};
+use crate::shared_args::{ComputeArgs, ToldHeightArgs, height_mm, positive, share, table_height_mm};
 
 /// `sdg ros2`
 #[derive(Debug, Args)]
@@ -22,7 +22,7 @@ pub struct Ros2Args {
     #[arg(long, value_name = "FRAME")]
     pub base_frame: Option<String>,
     /// With --base-frame: z of the table in that frame; default: the value in the workcell file, else 0
-    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, value_parser = table_height_mm)]
     pub table_height_mm: Option<f64>,
     /// With --base-frame: maximum difference between the stamps of transform and picture
     #[arg(long, value_name = "SECS", default_value_t = 0.2, value_parser = positive)]

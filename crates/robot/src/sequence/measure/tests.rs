@@ -24,6 +24,8 @@ struct Shown {
     shows: Vec<bool>,
     num_sights: usize,
     sees_surface: bool,
+    /// Angle by which every second picture for the height shows the part turned, as an equivalent orientation, rad.
+    turned_rad: f64,
 }
 
 impl PartFinder<PlannedArm> for Shown {
@@ -34,7 +36,15 @@ impl PartFinder<PlannedArm> for Shown {
     fn sight(&mut self, arm: &mut PlannedArm, expected: &GraspTarget) -> crate::Result<Vec<Sighting>> {
         let is_shown = self.shows.get(self.num_sights).or(self.shows.last()).copied().unwrap_or(true);
         self.num_sights += 1;
-        if is_shown { self.known.sight(arm, expected) } else { Ok(Vec::new()) }
+        let mut shown = if is_shown { self.known.sight(arm, expected)? } else { Vec::new() };
+        if self.num_sights.is_multiple_of(2) {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.turned_rad);
+            shown.iter_mut().for_each(|shown| {
+                let pose = &mut shown.target.base_from_tcp;
+                pose.rotation = turn * pose.rotation;
+            });
+        }
+        Ok(shown)
     }
 
     fn surface_beside(
@@ -73,10 +83,19 @@ fn part(higher_m: f64) -> GraspTarget {
 /// Grasps a part that lies 20 mm higher than the table and is detected 5 mm too high; returns also the camera's
 /// positions for the height, and their number.
 fn grasped(config: &GraspConfig, shows: &[bool], sees_surface: bool) -> (GraspReport, Vec<Vector3<f64>>, usize) {
+    grasped_turned(config, shows, sees_surface, 0.0)
+}
+
+fn grasped_turned(
+    config: &GraspConfig,
+    shows: &[bool],
+    sees_surface: bool,
+    turned_rad: f64,
+) -> (GraspReport, Vec<Vector3<f64>>, usize) {
     let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let known = KnownTarget::new(Some(part(0.020)), camera(), config);
-    let mut finder = Shown { known, seen: part(0.025), shows: shows.to_vec(), num_sights: 0, sees_surface };
+    let mut finder = Shown { known, seen: part(0.025), shows: shows.to_vec(), num_sights: 0, sees_surface, turned_rad };
     let report = grasp(&mut robot, &mut finder, &mut (), camera(), config).unwrap();
     let num_sights = finder.num_sights;
     let places = arm.actions().iter().filter_map(|action| match action {
@@ -101,6 +120,16 @@ fn two_pictures_below_300_mm_give_the_height() {
     assert!((places[0] - places[1]).xy().norm() >= 0.080, "{places:?}");
     let target = report.targets.last().unwrap().unwrap().base_from_tcp.translation;
     assert!((target.vector - part(0.020).base_from_tcp.translation.vector).norm() < 1e-6, "{target}");
+}
+
+#[test]
+fn a_picture_of_an_equivalent_orientation_does_not_turn_the_grasp() {
+    for turned_rad in [std::f64::consts::PI, std::f64::consts::FRAC_PI_2] {
+        let (report, ..) = grasped_turned(&config(None), &[], true, turned_rad);
+        assert_eq!(report.outcome, GraspOutcome::Held);
+        let target = report.targets.last().unwrap().unwrap().base_from_tcp;
+        assert!(target.rotation.angle_to(&part(0.020).base_from_tcp.rotation) < 1e-6, "{target}");
+    }
 }
 
 #[test]

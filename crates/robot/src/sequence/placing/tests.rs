@@ -3,7 +3,7 @@ use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandState, MotionE
 use crate::error::RobotError;
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
-use crate::place::{Place, PlaceKind};
+use crate::place::PlaceKind;
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::safety::{CheckedMotion, SafetyLimits, WorkspaceBox};
 use crate::sequence::{LookOut, grasp};
@@ -26,6 +26,7 @@ struct Cell {
     delay: Duration,
     /// Distance of the contact below the expected one, m.
     lower_m: f64,
+    num_stops: usize,
 }
 
 impl Cell {
@@ -77,6 +78,7 @@ impl Arm for Cell {
         Ok(())
     }
     fn stop(&mut self) -> Result<()> {
+        self.num_stops += 1;
         Ok(())
     }
     fn recover(&mut self) -> Result<()> {
@@ -116,6 +118,7 @@ fn cell(slide: Isometry3<f64>) -> Cell {
         mode: ArmMode::Idle,
         delay: Duration::ZERO,
         lower_m: 0.0,
+        num_stops: 0,
     }
 }
 
@@ -194,6 +197,23 @@ fn a_stop_between_two_pictures_ends_the_sequence() {
     let config = GraspConfig { look_outs: vec![LookOut::Joints(ready_pose()); 2], ..config() };
     let ended = grasp(&mut robot, &mut Stopped, &mut (), CameraPose::InBase(Isometry3::identity()), &config);
     assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Mode(ArmMode::UserStopped)))), "{ended:?}");
+}
+
+#[test]
+fn a_stop_between_the_hand_and_the_arm_stops_the_fingers() {
+    let mut cell = cell(Isometry3::identity());
+    let mut num_asked = 0;
+    let watch = Watch::new(Box::new(move || {
+        num_asked += 1;
+        (num_asked > 1).then_some(StopReason::Interrupted)
+    }));
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), watch);
+    let motion = robot.plan_free(&ready_pose(), &sdg_kinematics::JointLimits::panda()).unwrap();
+    robot.start_hand(HandCommand::Move { opening_m: 0.04, speed_m_s: RELEASING_SPEED_M_S }).unwrap();
+    let ended = robot.follow(motion.clone());
+    assert!(matches!(ended, Err(RobotError::Stopped(StopReason::Interrupted))), "{ended:?}");
+    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
+    assert_eq!(cell.num_stops, 1);
 }
 
 /// Finds the part; planning with each picture takes at least this much longer than [`MAX_AGE`].
@@ -466,6 +486,30 @@ fn an_older_part_in_the_bin_is_not_the_one_put_down() {
 }
 
 #[test]
+fn a_part_that_was_never_in_the_bin_is_not_the_one_that_fell_beside_it() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
+    // 7 mm beside the bin; no earlier picture showed it.
+    let other = bin.base_from_part(0.02, 0.0) * Isometry3::translation(0.057, 0.0, 0.0);
+    let place = |slide: Isometry3<f64>, places: Vec<Place>| {
+        let mut cell = cell(slide);
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let mut finder = WithOlder { older: other, others: Vec::new() };
+        let (camera, placing) = (CameraPose::InBase(Isometry3::identity()), PlacingConfig::default());
+        let known = GraspConfig { part: Some(bar()), places, ..config() };
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &known, &bin, &placing).unwrap()
+    };
+    // The part lies in a corner of the bin, 64 mm from the centre.
+    let report = place(planar(0.045, 0.045, 0.0), Vec::new());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    // The part fell beside the bin, and the other one lies in a place of its own.
+    let at_m = other.translation.vector.xy().into();
+    let shelf = Place { name: "shelf".to_owned(), at_m, kind: PlaceKind::Pose, ..tray() };
+    let report = place(planar(0.08, 0.0, 0.0), vec![shelf]);
+    let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.starts_with("the part lies beside the bin, 80.0 mm"), "{why}");
+}
+
+#[test]
 fn the_hand_leaves_a_bin_although_a_part_may_lie_where_the_fingers_are() {
     let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() }.goal(1).unwrap();
     let flat = PartShape::new(bar().outline().to_vec(), 0.020, 0.014, 0.008).unwrap();
@@ -488,6 +532,23 @@ fn the_hand_leaves_a_tray_that_is_lower_than_its_file_says() {
     (cell.base_from_part.translation.z, cell.lower_m) = (0.03, 0.005);
     let known = GraspConfig { part: Some(tall), ..config() };
     let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+    assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
+}
+
+#[test]
+fn the_hand_leaves_a_place_where_it_came_nearer_to_an_obstacle_than_planned() {
+    // The hand's body is 29 mm above the tcp. At the expected contact it is 5 mm above the post; the real contact is
+    // 5 mm lower.
+    let goal = Place { kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
+    let at = goal.base_from_part(0.0, 0.0) * Point3::new(0.0, 0.085, 0.0);
+    let half_m = [0.008, 0.008, 0.5 * (0.03 + 0.0294 - 0.005)];
+    let base_from_obstacle = Isometry3::translation(at.x, at.y, half_m[2]);
+    let post = Obstacle { name: "post".to_owned(), shape: Shape::Box { half_m }, base_from_obstacle };
+    let mut cell = cell(Isometry3::identity());
+    (cell.base_from_part.translation.z, cell.lower_m) = (0.03, 0.005);
+    let known = GraspConfig { part: Some(bar()), obstacles: vec![post], ..config() };
+    let report = run(&mut cell, &known, &goal, &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
 }

@@ -84,6 +84,8 @@ impl Extrusion<'_> {
             ("opening of the jaws in m", self.jaw_width_px * self.metres_per_pixel, 1e-3, LARGEST_JAW_WIDTH_M),
             ("longest side in m", self.longest_side_m(), 0.005, 0.4),
             ("marked line in m", self.grasp.length() * self.metres_per_pixel, 1e-3, 0.4),
+            // The lightest foams have 10 kg/m³: a smaller value is that of a mass in kilograms, given as grams.
+            ("density in kg/m³", self.mass_kg / self.volume_m3(), 10.0, 1e5),
         ];
         for (name, value, low, high) in ranges {
             if !(low..=high).contains(&value) {
@@ -330,5 +332,7 @@ mod tests {
         assert!(refused(|e| e.jaw_width_px = 90.0).contains("opening of the jaws in m: expected 0.001 to 0.08"));
         assert!(refused(|e| e.metres_per_pixel = 0.01).contains("found 0.2"));
         assert!(refused(|e| e.mass_kg = f64::NAN).contains("mass in kg"));
+        // 28 cm³.
+        assert!(refused(|e| e.mass_kg = 0.17e-3).contains("density in kg/m³: expected 10 to 100000, found 6.07"));
     }
 }
