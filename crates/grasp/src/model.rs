@@ -211,7 +211,8 @@ impl GraspModel {
         verification: Verification,
     ) -> Result<Vec<GraspDetection>> {
         let window = SearchWindow::middle_of(whole, image.dimensions().into());
-        let mut found = read_sync(self.find_in(image, &window, verification, |_| true))?;
+        let counts = |detection: &GraspDetection| window.contains(&detection.grasp.center());
+        let mut found = read_sync(self.find_in(image, &window, verification, counts))?;
         found.iter_mut().for_each(|found| window.in_window(found));
         Ok(found.into_iter().map(|found| found.detection).collect())
     }

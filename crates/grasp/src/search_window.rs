@@ -124,6 +124,13 @@ impl SearchWindow {
         PlanarSimilarity::translation(f64::from(self.rect.left), f64::from(self.rect.top))
     }
 
+    /// Whether a point of the whole image lies in the window.
+    pub(crate) fn contains(&self, point: &Point2<f64>) -> bool {
+        let PixelRect { left, top, width, height } = self.rect;
+        let is_in = |at: f64, from: u32, side: u32| (0.0..f64::from(side)).contains(&(at - f64::from(from)));
+        is_in(point.x, left, width) && is_in(point.y, top, height)
+    }
+
     /// Moves a detection of the window to pixels of the whole image.
     pub(crate) fn in_whole(&self, found: &mut Found) {
         moved(found, &self.whole_from_window(), self.whole);

@@ -149,6 +149,12 @@ mod tests {
         };
         assert!(is_there(model.detect_in_middle(&middle, [640, 480], Verification::ByShape).unwrap()));
         assert!(!is_there(model.detect(&middle, Verification::ByShape).unwrap()));
+        // A grasp point 2 px inside the middle, and one 1 px beside it.
+        for (x, num_accepted) in [(22.0, 1), (19.0, 0)] {
+            let middle = drawn_part::picture([320, 240], &[drawn_part::at(x, 100.0, 0.0)]);
+            let found = model.detect_in_middle(&middle, [336, 252], Verification::ByShape).unwrap();
+            assert_eq!(found.iter().filter(|found| found.is_accepted()).count(), num_accepted, "{x}: {found:?}");
+        }
     }
 
     #[cfg(feature = "teach")]
