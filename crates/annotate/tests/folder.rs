@@ -254,6 +254,8 @@ fn a_tried_picture_keeps_its_grasp_but_a_box_alone_gives_way_to_what_was_found()
     let folder = folder_of(&["rod.png", "other.png"]);
     std::fs::write(folder.path().join("other.json"), LABELME).unwrap();
     let served = Served::of_photo(folder, "rod.png");
+    // The folder is listed before a picture is chosen.
+    assert_eq!(names(&session(&served)["others"]), ["other.png"]);
     served.ask("POST", "/api/others/0/try", b"").json();
     let accept = |marks: &str| served.ask("POST", "/api/trial-pictures/0/accept", marks.as_bytes()).json();
     let first = accept(MARKS);

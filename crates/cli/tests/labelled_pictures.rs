@@ -392,6 +392,8 @@ fn labels_of_another_part_are_told_and_can_be_left_out() {
     let (model, report) = (teach(folder.path()), folder.path().join("report"));
     let case = Case::new("a.json", &labelme(&instance("bolt", 1, 100.0)));
     let pictures = case.folder.path();
+    // Another picture than the photo from which the model was taught.
+    image::open(pictures.join("a.png")).unwrap().rotate180().save(pictures.join("a.png")).unwrap();
     let evaluated =
         sdg(&["evaluate", "--pictures", text(pictures), "--grasp-model", text(&model), "--report", text(&report)]);
     let stderr = String::from_utf8(evaluated.stderr).unwrap();

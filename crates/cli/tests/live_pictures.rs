@@ -210,7 +210,7 @@ fn cameras_that_are_none_are_refused() {
     let file = format!("file:{}", from.path().join("a.png").display());
     assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);
     assert_refused(&grab(&file, &["--stall-secs=-1"]), 2, &["positive number of seconds"]);
-    assert_refused(&grab(&file, &["--stall-secs", "1e30"]), 2, &["--stall-secs", "0.01 to 3600 seconds"]);
+    assert_refused(&grab(&file, &["--stall-secs", "1e8"]), 2, &["--stall-secs", "0.01 to 3600 seconds"]);
     assert_refused(&grab("http://127.0.0.1:1/", &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
     // Settings that the camera does not have.
     let of_v4l = ["--size", "640x480", "--encoding", "yuyv", "--exposure-ms", "8", "--white-balance-kelvin", "4600"];

@@ -11,9 +11,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use sdg_kinematics::ArmGeometry;
 use sdg_ros2::Naming;
-use sdg_ros2::dds::{
-    ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment, watch_network_threads,
-};
+use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment, watch_network_threads};
 use sdg_ros2_node::IsInterrupted;
 
 use crate::exit::{Outcome, Usage};
