@@ -474,8 +474,8 @@ mod tests {
         assert_eq!(decoded(&whole).unwrap().dimensions(), (8, 6));
         let pages: Vec<u64> = File::new(&whole).unwrap().pages().unwrap().iter().map(|page| page.at).collect();
         for at in pages {
-            // The number of values of the page's first tag follows the tag and the kind of its values.
-            let count_at = at as usize + 2 + 4;
+            // The width, the page's second tag: the number of values follows the tag and the kind of its values.
+            let count_at = at as usize + 2 + 12 + 4;
             let mut damaged = whole.clone();
             damaged[count_at..count_at + 4].copy_from_slice(&100_000_000u32.to_le_bytes());
             let told = decoded(&damaged).unwrap_err().to_string();

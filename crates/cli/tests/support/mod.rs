@@ -79,7 +79,7 @@ pub fn taught_pendulum(out: impl AsRef<Path>, camera: Option<&Path>) {
 /// Writes a photo and its marks, from which a model is taught that fails its own samples: a patch of a checkerboard,
 /// which occurs everywhere in the picture.
 pub fn write_unusable_demonstration(photo: &Path) {
-    let is_light = |x: u32, y: u32| (x / 40 + y / 40) % 2 == 0;
+    let is_light = |x: u32, y: u32| (x / 40 + y / 40).is_multiple_of(2);
     let checks = GrayImage::from_fn(640, 480, |x, y| Luma([if is_light(x, y) { 200 } else { 60 }]));
     checks.save(photo).unwrap();
     let marks = serde_json::json!({

@@ -154,14 +154,17 @@ fn one_network_serves_the_models_that_are_taught_alike() {
     let taught = taught(Preset::Edge, ModelKind::C);
     let read = taught.clone().read_as(ModelKind::B).unwrap();
     assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
-    // Both models give the same boxes, each in the order of its own scores. Conversion back restores the detections.
+    // Both models give the same boxes, each in the order of its own scores, except at the picture's edge, where one
+    // model's grasp may lie outside. Conversion back restores the detections.
     let photo = demonstration().image;
     let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
     let boxes = |model: &GraspModel| {
-        let mut boxes: Vec<_> = said(model).iter().map(|found| found.bbox).collect();
+        let boxes = said(model).into_iter().map(|found| found.bbox);
+        let mut boxes: Vec<_> = boxes.filter(|bbox| bbox.x2.max(bbox.y2) < f64::from(PHOTO[0])).collect();
         boxes.sort_by(|a, b| a.x1.total_cmp(&b.x1).then(a.y1.total_cmp(&b.y1)));
         boxes
     };
+    assert!(!boxes(&read).is_empty());
     assert_eq!(boxes(&read), boxes(&taught));
     assert_eq!(said(&read.clone().read_as(ModelKind::C).unwrap()), said(&taught));
     assert!(read.clone().read_as(ModelKind::A).is_none() && read.read_as(ModelKind::S).is_none());

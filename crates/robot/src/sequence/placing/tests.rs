@@ -503,7 +503,8 @@ fn a_part_that_was_never_in_the_bin_is_not_the_one_that_fell_beside_it() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     // The part fell beside the bin, and the other one lies in a place of its own.
     let at_m = other.translation.vector.xy().into();
-    let shelf = Place { name: "shelf".to_owned(), at_m, kind: PlaceKind::Pose, ..tray() };
+    let kind = PlaceKind::Bin { size_m: [0.02, 0.02] };
+    let shelf = Place { name: "shelf".to_owned(), at_m, kind, ..tray() };
     let report = place(planar(0.08, 0.0, 0.0), vec![shelf]);
     let PlacingOutcome::Failed { step: GraspStep::Check, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.starts_with("the part lies beside the bin, 80.0 mm"), "{why}");
