@@ -355,7 +355,7 @@ mod tests {
             outline: Some(Polygon::from_box(&bbox)),
         };
         let written = AnnotationFormat::LabelMe.write(&IMAGE, std::slice::from_ref(&marked)).unwrap();
-        assert_eq!(Annotation::read(written.text.as_bytes(), &IMAGE).unwrap(), [marked.clone()]);
+        assert_eq!(Annotation::read(written.text.as_bytes(), &IMAGE).unwrap(), std::slice::from_ref(&marked));
         assert!(written.left_out.is_empty());
         let without_line = Annotation { grasp: None, ..marked };
         let written = AnnotationFormat::LabelMe.write(&IMAGE, &[without_line]).unwrap();
