@@ -7,7 +7,6 @@ copies have the identity of that peer, so that they reach the readers and writer
 """
 
 import collections
-import os
 import pathlib
 import random
 import socket
@@ -16,7 +15,7 @@ import subprocess
 import sys
 import time
 
-from cyclone import LOOPBACK, Peer, best_effort, make, pack, reliable, transient_local, unpack
+from cyclone import Peer, best_effort, make, pack, reliable, transient_local, unpack
 from node_tests import CAMERA, Sdg, check, failures, header, image, photo, send_at, teach
 
 DOMAIN = 47
@@ -229,7 +228,10 @@ def main(sdg, folder, count):
 
         works("before")
         before = node.rss_mb()
-        attacker = subprocess.Popen([sys.executable, __file__, "--attack", str(count)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        command = [sys.executable, __file__, "--attack", str(count)]
+        # Cyclone prints each mutated packet that it rejects.
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        attacker = subprocess.Popen(command, text=True, **pipes)
         print("      " + attacker.stdout.readline().strip(), flush=True)
         begun = time.monotonic()
         for line in attacker.stdout:
@@ -266,8 +268,6 @@ def honest(seconds):
 
 
 if __name__ == "__main__":
-    # Cyclone would print each mutated packet that it rejects.
-    os.environ["CYCLONEDDS_URI"] = LOOPBACK.replace("</Domain>", "<Tracing><OutputFile>/dev/null</OutputFile></Tracing></Domain>")
     if sys.argv[1] == "--attack":
         sys.exit(attack(DOMAIN, int(sys.argv[2])))
     if sys.argv[1] == "--honest":
