@@ -80,7 +80,7 @@ GUARDS = [
     ("page: a body that does not come", "crates/annotate/src/server.rs", "timeout(patience, body.frame())", "timeout(Duration::from_secs(600), body.frame())", "sdg-annotate"),
     ("page: the session of the numbers", "crates/annotate/src/routes/mod.rs", "if head.all(SESSION_HEADER).any(|id| session.as_ref().is_none_or(|session| id != session.id())) {", "if false {", "sdg-annotate"),
     ("page: strokes of an outline", "crates/annotate/src/routes/images.rs", "if strokes.len() > MAX_STROKES || most > MAX_POINTS {", "if false && (strokes.len() > MAX_STROKES || most > MAX_POINTS) {", "sdg-annotate"),
-    ("page: pictures to try", "crates/annotate/src/session/folder.rs", "state.trial_pictures.len() >= MAX_TRIAL_PICTURES", "state.trial_pictures.len() >= usize::MAX", "sdg-annotate"),
+    ("page: pictures to try", "crates/annotate/src/session/tried.rs", "if self.trial_ids().count() < MAX_TRIAL_PICTURES {", "if self.trial_ids().count() < usize::MAX {", "sdg-annotate"),
     ("page: letters of a name", "crates/annotate/src/session.rs", "if count == 0 || count > MAX_LABEL_CHARS || ", "if count == 0 || ", "sdg-annotate"),
     # Franka's protocol.
     ("Franka: a message's announced size", "crates/fci/src/wire/header.rs", " || header.size > MAX_MESSAGE_SIZE {", " {", "sdg-fci"),
