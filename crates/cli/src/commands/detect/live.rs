@@ -182,7 +182,7 @@ mod tests {
 
     use clap::Parser;
     use nalgebra::Vector2;
-    use sdg_evaluation::shipped;
+    use sdg_demonstration::Demonstration;
     use sdg_grasp::{ModelKind, TeachOptions, TrackState, Verification, teach};
     use serde_json::Value;
 
@@ -191,7 +191,10 @@ mod tests {
 
     #[test]
     fn a_tracked_part_is_accepted_while_it_is_followed() {
-        let photo = shipped::demonstration("pendulum").unwrap();
+        // The program without the simulation has no demonstrations in it.
+        let photo = include_bytes!("../../../../../datasets/demonstrations/pendulum/image.png");
+        let marks = include_bytes!("../../../../../datasets/demonstrations/pendulum/annotation.json");
+        let photo = Demonstration::decode(photo, marks, None).unwrap();
         let picture = photo.image.clone();
         let mut options = TeachOptions::new(1);
         options.kind = ModelKind::S;
