@@ -1,9 +1,11 @@
-// The page's interface to the worker: a promise for each request, and a new worker if one stopped.
+// The page's interface to the worker: a promise for each request, and a new worker if one stopped. If a worker cannot be
+// started, each request gets the reason.
 
 export class Detector {
   #device;
   #worker = null;
   #model = null; // The open model's bytes, for a worker that has to be started again.
+  #notStarted = null; // Why the worker could not be started.
   #waiting = new Map();
   #nextId = 1;
 
@@ -35,11 +37,15 @@ export class Detector {
     this.#worker.onmessage = ({ data }) => this.#receive(data);
     this.#worker.onerror = (event) => {
       event.preventDefault();
-      this.#startAgain(event.message || "the worker could not be started");
+      this.#notStarted = event.message || "the worker could not be started";
+      this.#fail(this.#notStarted);
     };
   }
 
   #ask(request, transfer = []) {
+    if (this.#notStarted) {
+      return Promise.reject(new Error(this.#notStarted));
+    }
     const id = this.#nextId++;
     return new Promise((resolve, reject) => {
       this.#waiting.set(id, { resolve, reject });
@@ -69,9 +75,10 @@ export class Detector {
 
   #startAgain(reason) {
     this.#fail(reason);
+    this.#start();
     if (this.#model) {
-      this.#start();
-      this.#ask({ open: this.#model }).catch(() => {});
+      // A model with which the worker stops again is not opened forever.
+      this.#ask({ open: this.#model }).catch(() => (this.#model = null));
     }
   }
 }

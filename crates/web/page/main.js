@@ -38,7 +38,7 @@ function wire() {
   element("verify").onchange = detectInAllAgain;
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
-  element("webgpu").onchange = changeDevice;
+  element("webgpu").onchange = () => changeDevice();
   element("webgpu-choice").hidden = !navigator.gpu; // Browsers offer WebGPU only to pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
@@ -73,7 +73,7 @@ function watchWidth(watched, redraw) {
 }
 
 /** Uses the open model on the other device; if that fails, switches back. */
-async function changeDevice() {
+async function changeDevice(opened = modelOpen ? modelFile : null) {
   stopCamera();
   if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
     element("webgpu").checked = false;
@@ -81,15 +81,14 @@ async function changeDevice() {
     return;
   }
   generation += 1; // Results of the old worker are ignored.
-  pictures.forEach(({ small }) => (small.textContent = "waiting"));
-  const opened = modelOpen ? modelFile : null;
+  pictures.forEach(({ small }) => (small.textContent = waitingText()));
   modelOpen = false;
   detector.close();
   detector = new Detector(element("webgpu").checked ? "webgpu" : "processor");
   if (opened && !(await openModel(opened)) && element("webgpu").checked) {
     const complaint = element("alert").textContent;
     element("webgpu").checked = false;
-    await changeDevice();
+    await changeDevice(opened);
     complain(`The graphics card cannot be used, the processor is. ${complaint}`);
   }
 }
@@ -135,6 +134,8 @@ function showModel(name, { model, preset, object, teaching }) {
   element("model-facts").replaceChildren(list);
 }
 
+const waitingText = () => (modelOpen ? "waiting" : "waiting for a model");
+
 function addPictures(files) {
   if (files.length) {
     complain(null);
@@ -146,7 +147,7 @@ function addPictures(files) {
     picture.button.type = "button";
     picture.image = document.createElement("img");
     picture.image.alt = "";
-    picture.small = make("small", modelOpen ? "waiting" : "waiting for a model");
+    picture.small = make("small", waitingText());
     const text = make("span", file.name);
     text.append(picture.small);
     picture.button.append(picture.image, text);
@@ -175,6 +176,12 @@ async function detectInAll(some) {
 
 function detectInAllAgain() {
   generation += 1;
+  // Results of another model or setting are neither shown nor saved.
+  for (const picture of pictures) {
+    Object.assign(picture, { result: null, error: null });
+    picture.small.textContent = waitingText();
+  }
+  showCurrent();
   detectInAll([...pictures]);
 }
 
@@ -273,6 +280,10 @@ async function detectInFrame(bitmap) {
       showCurrent();
     }
   } catch (error) {
+    // The model was closed on purpose.
+    if (!camera.running) {
+      return;
+    }
     complain(error.message);
     stopCamera();
   }

@@ -13,6 +13,23 @@ const VECTOR_MODULE = new Uint8Array([
   0x0b, // end
 ]);
 
+/** Whether workers can be modules: only then does the browser read the option. */
+function hasModuleWorkers() {
+  let isRead = false;
+  const options = {
+    get type() {
+      isRead = true;
+      throw new Error("no worker is started");
+    },
+  };
+  try {
+    new Worker(import.meta.url, options).terminate();
+  } catch {
+    // The option was read.
+  }
+  return isRead;
+}
+
 /** The missing feature as a sentence; null if nothing is missing. */
 export function missingSupport() {
   if (typeof WebAssembly !== "object") {
@@ -23,6 +40,9 @@ export function missingSupport() {
   }
   if (typeof OffscreenCanvas !== "function" || typeof Worker !== "function") {
     return "This browser cannot draw outside the page (OffscreenCanvas), which keeps the page fluid during the search. Safari has it from version 16.4.";
+  }
+  if (!hasModuleWorkers()) {
+    return "This browser cannot start a module as a worker, which keeps the page fluid during the search. Chrome and Edge can from version 80, Firefox from 114, Safari from 15.";
   }
   return null;
 }

@@ -7,7 +7,7 @@ use sdg_webdriver::{Browser, Site};
 use serde_json::{Value, json};
 
 use crate::taught::{Made, array, detect};
-use crate::{assert_quiet, choose, open_model, open_page, repository, screenshots, site};
+use crate::{SOFTWARE_CARD, assert_quiet, choose, open_model, open_page, repository, screenshots, site};
 
 /// Maximum differences between page and command line.
 const MAX_PX: f64 = 0.5;
@@ -35,9 +35,6 @@ const MAX_CARD_DOWNLOAD_BYTES: usize = 4_700_000;
 
 const PROCESSOR: &str = "processor";
 const CARD: &str = "webgpu";
-/// Makes Chromium provide a software graphics card.
-const SOFTWARE_CARD: [&str; 3] =
-    ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
 
 /// Searches the files of the page's input with the page's own modules, and keeps all digits.
 const LOOK: &str = "return (async (device, looks) => {

@@ -8,7 +8,9 @@
 mod bad_input;
 mod camera;
 mod grasps;
+mod models;
 mod taught;
+mod workers;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -35,6 +37,10 @@ fn site() -> Site {
     assert!(folder.join("sdg_web_bg.wasm").is_file(), "make web writes {}", folder.display());
     serve_folder(folder).unwrap()
 }
+
+/// Makes Chromium provide a software graphics card.
+const SOFTWARE_CARD: [&str; 3] =
+    ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
 
 /// Opens the page in a browser with these flags.
 fn open_page(site: &Site, flags: &[&str]) -> Browser {
