@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Endurance tests in sections; crash resumes an earlier run, soak and robot stop at a time limit. docs/testing.md has the figures.
 #
-#   endure.sh [SECTION…]   crash, refusals, soak, robot, limits, mutants; without a section, the first four
+#   endure.sh [SECTION…]   crash, refusals, soak, robot, flakey, limits, mutants; without a section, the first four
 #   QUICK=1                only a few repetitions of each
 #   KILLS, FRAMES, SESSIONS, DISCONNECTIONS, ATTEMPTS   numbers of repetitions; SECS: maximum time of a part of soak or robot
 set -euo pipefail
@@ -40,9 +40,10 @@ for section in "${sections[@]}"; do
             scripts/build.sh --example endured_attempts
             try "$programs/examples/endured_attempts" "$attempts" 0 "$secs"
             ;;
+        flakey) try scripts/hardening/flakey.sh $(((kills + 9) / 10)) ;;
         limits) try scripts/hardening/limits.sh ;;
         mutants) try scripts/hardening/mutants.sh ;;
-        *) echo "endure: expected crash, refusals, soak, robot, limits or mutants, found $section" >&2; exit 2 ;;
+        *) echo "endure: expected crash, refusals, soak, robot, flakey, limits or mutants, found $section" >&2; exit 2 ;;
     esac
 done
 [ ${#failed[@]} -eq 0 ] || { printf 'endure: failed: %s\n' "${failed[@]}" >&2; exit 1; }

@@ -9,6 +9,7 @@ use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
+use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use rand::{Rng, SeedableRng};
@@ -17,16 +18,22 @@ use serde_json::{Value, json};
 
 use crate::disk::{Disk, Loss};
 use crate::files::{contents_under, files_under, fresh};
+use crate::flakey::FlakeyDisk;
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 use crate::tracer::{Ending, Tracee};
 
-/// Kills a command until `kills` kills are in the log, including those of earlier calls, and prints a summary.
+/// Maximum time between a kill and the power cut of a flakey disk, whose journal is committed every second.
+const MAX_CUT_AFTER: Duration = Duration::from_millis(2500);
+
+/// Kills a command until `kills` kills are in the log, including those of earlier calls, and prints a summary. The
+/// command works on `flakey`, whose power is cut after the kill; without it the loss is simulated.
 ///
 /// # Errors
 /// The run without a kill fails; a kill loses or damages a file; the command fails when it is run again after a kill.
-pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Result<()> {
-    let work = places.work.join("crash").join(scenario.name().replace(' ', "-"));
+pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places, flakey: Option<&FlakeyDisk>) -> Result<()> {
+    let section = if flakey.is_some() { "flakey" } else { "crash" };
+    let work = places.work.join(section).join(scenario.name().replace(' ', "-"));
     fs::create_dir_all(&work)?;
     let log = work.join(format!("kills-{seed}.jsonl"));
     // An earlier call that was cut off may leave a damaged last line.
@@ -41,6 +48,7 @@ pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Resul
     fresh(&reference)?;
     scenario.prepare(places, &reference, false)?;
     let (ending, changes, _) = traced(scenario, places, &reference, &work.join("kept"), None)?;
+    let runs = flakey.map_or(work.as_path(), FlakeyDisk::folder);
     ensure!(is_good(scenario, ending), "{}: without a kill: {ending:?}", scenario.name());
 
     let mut lines = lines;
@@ -48,7 +56,7 @@ pub fn kill(scenario: Scenario, kills: u64, seed: u64, places: &Places) -> Resul
         let mut random = Pcg64Mcg::seed_from_u64(seed ^ (number << 20));
         // `changes + 1` cuts the power after the command has ended.
         let at = random.random_range(1..=changes + 1);
-        let line = one(scenario, number, at, &mut random, places, &work, &reference)
+        let line = one(scenario, number, at, &mut random, places, runs, flakey, &reference)
             .with_context(|| format!("{}: kill {number}", scenario.name()))?;
         writeln!(OpenOptions::new().append(true).open(&log)?, "{line}")?;
         lines.push(line);
@@ -122,27 +130,45 @@ fn traced(
     Ok((ending, changes, disk))
 }
 
-/// Kills a command once, cuts the power and checks the folder; after some of the kills, runs the command again.
+/// Kills a command once in a folder of `runs`, cuts the power and checks the folder; after some of the kills, runs the
+/// command again.
+#[expect(clippy::too_many_arguments, reason = "a function of this file, called once")]
 fn one(
     scenario: Scenario,
     number: u64,
     at: u64,
     random: &mut Pcg64Mcg,
     places: &Places,
-    work: &Path,
+    runs: &Path,
+    flakey: Option<&FlakeyDisk>,
     reference: &Path,
 ) -> Result<Value> {
-    let (run, after, kept) = (work.join("run"), work.join(format!("after-{number}")), work.join("kept"));
+    let (run, kept) = (runs.join("run"), runs.join("kept"));
     fresh(&run)?;
     scenario.prepare(places, &run, number % 2 == 1)?;
     let before = contents_under(&run)?;
+    // SAFETY: no memory is involved.
+    unsafe { libc::sync() };
     let (ending, changes, disk) = traced(scenario, places, &run, &kept, Some(at))?;
-    if after.exists() {
-        fs::remove_dir_all(&after)?;
-    }
-    let loss = disk.after_power_cut(random, &after)?;
-    let Loss { contents, folders } = loss;
-    let mut line = json!({"number": number, "at": at, "changes": changes, "ending": format!("{ending:?}"), "lost": contents + folders});
+    let (after, lost) = match flakey {
+        Some(flakey) => {
+            let written = contents_under(&run)?;
+            thread::sleep(random.random_range(Duration::ZERO..=MAX_CUT_AFTER));
+            flakey.cut_power()?;
+            let found = contents_under(&run)?;
+            (run, written.iter().filter(|file| !found.contains(file)).count())
+        }
+        None => {
+            let after = runs.join(format!("after-{number}"));
+            if after.exists() {
+                fs::remove_dir_all(&after)?;
+            }
+            let Loss { contents, folders } = disk.after_power_cut(random, &after)?;
+            (after, contents + folders)
+        }
+    };
+    let mut line =
+        json!({"number": number, "at": at, "changes": changes, "ending": format!("{ending:?}"), "lost": lost});
     let found = judge(scenario, ending, &before, places, &after).and_then(|found| {
         if number.is_multiple_of(scenario.again_every()) {
             scenario.again(places, &after, reference).context("again")?;

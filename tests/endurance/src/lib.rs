@@ -1,7 +1,7 @@
 //! Endurance tests of `make endure`, on Linux for x86-64 only.
 //!
 //! - [`crash`]: commands killed at random moments under [`tracer`]; [`disk`] loses unsynced data. A later call resumes
-//!   the run.
+//!   the run. With a [`flakey`] device, in a virtual machine, Linux itself loses the data.
 //! - [`refusals`]: the same commands on a full or read-only disk, without free descriptors, or while the clock is set
 //!   back.
 //! - [`soak`]: long runs of live detection, of the page, and of a camera that disconnects.
@@ -14,6 +14,7 @@ pub mod boards;
 pub mod crash;
 pub mod disk;
 pub mod files;
+pub mod flakey;
 pub mod page;
 pub mod refusals;
 pub mod scenario;

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::files::{contents_under, files_under, fresh};
+use crate::flakey::run;
 use crate::page::Page;
 use crate::scenario::{Places, Scenario};
 
@@ -73,12 +74,6 @@ impl Drop for SmallDisk {
     fn drop(&mut self) {
         let _ = Command::new("umount").arg(&self.0).status();
     }
-}
-
-fn run(command: &mut Command) -> Result<()> {
-    let status = command.status().with_context(|| command.get_program().display().to_string())?;
-    ensure!(status.success(), "{command:?}: {status}; is this run as root?");
-    Ok(())
 }
 
 /// Runs a command with every fault of the machine and prints how often it was refused.

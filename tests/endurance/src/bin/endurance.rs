@@ -18,6 +18,7 @@ mod sections {
 
     use anyhow::{Context, Result, ensure};
     use clap::{Parser, Subcommand, ValueEnum};
+    use sdg_endurance::flakey::FlakeyDisk;
     use sdg_endurance::scenario::{Places, Scenario};
     use sdg_endurance::soak::FrameRun;
     use sdg_endurance::{crash, refusals, soak};
@@ -41,6 +42,9 @@ mod sections {
             kills: u64,
             #[arg(long, default_value_t = 1)]
             seed: u64,
+            /// A block device, whose content is lost: dm-flakey drops its writes at each kill (needs root).
+            #[arg(long, value_name = "DEVICE")]
+            flakey: Option<PathBuf>,
             /// Commands to test; all by default.
             #[arg(value_enum)]
             commands: Vec<Scenario>,
@@ -97,8 +101,10 @@ mod sections {
         fs::create_dir_all(&work)?;
         let places = Places { sdg, root, work };
         match section {
-            Section::Crash { kills, seed, commands } => {
-                each(&commands, |command| crash::kill(command, kills, seed, &places))
+            Section::Crash { kills, seed, flakey, commands } => {
+                let mount = places.work.join("mount");
+                let flakey = flakey.map(|device| FlakeyDisk::format(&device, &mount)).transpose()?;
+                each(&commands, |command| crash::kill(command, kills, seed, &places, flakey.as_ref()))
             }
             Section::Refusals { commands } => each(&commands, |command| refusals::try_all(command, &places)),
             Section::Frames { model, frames, every_frame, frames_a_connection, max_secs } => {
