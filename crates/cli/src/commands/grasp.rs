@@ -119,9 +119,7 @@ fn prepare(args: &GraspArgs) -> Result<GraspTask> {
         let found = args.max_detection_age_secs;
         return Err(Usage(format!("--max-detection-age-secs: expected a positive number, found {found}")).into());
     }
-    let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| {
-        Usage(format!("expected --camera FILE, or a file under [camera] in {}", args.workcell.display()))
-    })?;
+    let camera_path = robots::camera_file(args.camera.as_deref(), camera_of_workcell, &args.workcell)?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
     let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;

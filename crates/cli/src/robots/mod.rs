@@ -5,7 +5,7 @@ mod dry_run;
 #[cfg(feature = "simulation")]
 mod simulated_scene;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Result;
@@ -57,6 +57,21 @@ impl RobotChoice {
             }
         }
     }
+}
+
+/// The camera file given on the command line, or else in the workcell file at `workcell`.
+///
+/// # Errors
+/// [`Usage`] if neither names one.
+pub(crate) fn camera_file(
+    option: Option<&Path>,
+    of_workcell: Option<PathBuf>,
+    workcell: &Path,
+) -> Result<PathBuf, Usage> {
+    option
+        .map(Path::to_path_buf)
+        .or(of_workcell)
+        .ok_or_else(|| Usage(format!("expected --camera FILE, or a file under [camera] in {}", workcell.display())))
 }
 
 /// Scheduling of the control loop of a real arm.
