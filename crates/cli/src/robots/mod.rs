@@ -13,6 +13,7 @@ use sdg_robot::{Pace, RobotAddress, Scheduling, StopReason, Watch};
 
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;
+use crate::paint::{Paint, Tone};
 
 pub(crate) use confirm::{Consent, confirm};
 #[cfg(not(feature = "simulation"))]
@@ -93,17 +94,24 @@ pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
     Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
 }
 
-/// Writes the arm's last second of states after an error and prints the file's path. Does nothing if no state was
-/// received.
+/// Checks, before anything moves, that [`write_states`] can write its file.
 ///
 /// # Errors
 /// The file cannot be written.
-pub(crate) fn write_states(path: &Path, watch: &Watch) -> Result<()> {
-    if watch.states().len() > 0 {
-        sdg_files::write(path, watch.states_csv().as_bytes())?;
-        eprintln!("the arm's last second: {}", path.display());
+pub(crate) fn check_states(path: &Path) -> Result<()> {
+    Ok(sdg_files::check_replaceable(path, None, b"time_secs")?)
+}
+
+/// Writes the arm's last second of states after an error and prints the file's path. Does nothing if no state was
+/// received. A file that cannot be written is a warning, which does not replace the arm's error.
+pub(crate) fn write_states(path: &Path, watch: &Watch) {
+    if watch.states().len() == 0 {
+        return;
     }
-    Ok(())
+    match sdg_files::write(path, watch.states_csv().as_bytes()) {
+        Ok(()) => eprintln!("the arm's last second: {}", path.display()),
+        Err(error) => eprintln!("{} {error}", Paint::stderr().text(Tone::Doubtful, "warning:")),
+    }
 }
 
 #[cfg(test)]
