@@ -261,6 +261,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             }
             CameraPose::InBase(_) => first,
         };
+        self.check_target(&target)?;
         is_wanted(self, &target)?;
         self.take(&target)
     }
