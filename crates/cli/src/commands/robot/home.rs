@@ -47,6 +47,8 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         let (mut arm, address) = args.arm.connect()?;
         if confirm(&format!("Move the fingers of the hand at {address}?"), args.yes)? == Consent::Given {
             arm.home_hand()?;
+            // The hand no longer holds an object.
+            arm.set_load(Load::NONE)?;
         }
         return Ok(Outcome::Done);
     }
