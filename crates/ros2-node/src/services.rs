@@ -100,8 +100,8 @@ struct Wait {
 }
 
 impl Wait {
-    /// Whether the picture that arrived last was too early for the request, and the next one will be too late. A picture
-    /// in the queue may be skipped, but only for a newer one.
+    /// Whether the time is over and no picture has arrived since the request. A picture in the queue may be skipped, but
+    /// only for a newer one.
     fn is_over(&self, now: Instant, newest_arrival: Option<Instant>) -> bool {
         self.deadline < now && newest_arrival.is_none_or(|arrived| arrived < self.asked)
     }

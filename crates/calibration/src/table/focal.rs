@@ -91,11 +91,11 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point, or if the
-    /// sheet can be located with none of the other focal lengths.
+    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point, or if no
+    /// other focal length can locate the sheet.
     pub at_sheet_m: f64,
-    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height; NaN if the
-    /// sheet can be located with none of the other focal lengths.
+    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height; NaN if no
+    /// other focal length can locate the sheet.
     pub at_border_m: f64,
 }
 

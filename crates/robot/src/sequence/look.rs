@@ -98,8 +98,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Stores and returns the accepted detection of a picture that was `taken` at this time; a target that is not finite
-    /// is a failure.
+    /// Stores and returns the accepted detection of a picture that was `taken` at this time; a target that is not
+    /// finite is a failure.
     fn keep(&mut self, target: Option<GraspTarget>, taken: Option<Instant>) -> Steps<Option<GraspTarget>> {
         self.note_others();
         self.known.picture_time = taken;
