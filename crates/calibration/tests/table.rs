@@ -105,6 +105,19 @@ fn the_focal_length_costs_nothing_on_the_table_and_more_above_it() {
 }
 
 #[test]
+fn a_tilt_that_another_focal_length_would_make_too_large_has_a_focal_cost() {
+    // A tilt of 74°, 17° beside the optical axis: with a focal length longer by 10 % it would be 75.5°.
+    let half_tangent = 37_f64.to_radians().tan();
+    let pose = camera_from_board(&board(), &PHONE, [646.0, 656.0], 0.5, [half_tangent, 0.0, 0.0]);
+    let corners = corners(&PHONE, &pose, 0.0, &mut Random(1));
+    let longer = PinholeCamera { fx: 1.1 * PHONE.fx, fy: 1.1 * PHONE.fy, ..PHONE };
+    let error = locate_sheet(&longer, &board(), &corners).unwrap_err();
+    assert!(matches!(error, CalibrationError::Horizon { .. }), "{error}");
+    let cost = focal_cost(&PHONE, &board(), &corners, 0.03, 0.1).unwrap();
+    assert!(cost.at_sheet_m > 0.0 && cost.at_border_m >= cost.at_sheet_m, "{cost:?}");
+}
+
+#[test]
 fn a_horizon_is_refused() {
     let pose = camera_from_board(&board(), &PHONE, [640.0, 360.0], 0.5, [0.8, 0.0, 0.0]);
     let error = locate_sheet(&PHONE, &board(), &corners(&PHONE, &pose, 0.05, &mut Random(1))).unwrap_err();

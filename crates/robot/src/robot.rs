@@ -280,7 +280,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     }
 
     /// The state, if the arm may move now.
-    fn ready(&mut self) -> Result<ArmState> {
+    pub(crate) fn ready(&mut self) -> Result<ArmState> {
         if let Some(why) = &self.latched {
             return Err(RobotError::Latched(why.clone()));
         }

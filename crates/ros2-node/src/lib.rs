@@ -92,7 +92,7 @@ pub fn run(
                 }
             }
         }
-        if let Some(taught) = services.work(&reader.topic, searcher.model(), &camera_pose) {
+        if let Some(taught) = services.work(&reader, searcher.model(), &camera_pose) {
             let changed = searcher.change_model(&taught.path, &settings.device).map_err(|error| one_line(&error));
             services.answer_use(&taught, changed);
         }

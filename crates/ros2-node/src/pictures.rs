@@ -83,6 +83,11 @@ impl Shared {
         if is_old(&mut kept) { None } else { kept.newest.clone() }
     }
 
+    /// The time at which the newest picture arrived.
+    pub(super) fn newest_arrival(&self) -> Option<Instant> {
+        self.lock().newest.as_ref().map(|newest| newest.arrived)
+    }
+
     fn put(&self, picture: Picture) {
         let mut kept = self.lock();
         if kept.waiting.len() >= self.queue {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
 
-use sdg_cell::drawing;
 use sdg_ros2::RosError;
 use sdg_ros2::dds::{Node, Publisher, Qos};
 use sdg_ros2::encoding::{to_compressed, to_image};
@@ -86,7 +85,7 @@ impl Topics {
         if !raw && !compressed {
             return;
         }
-        let drawn = drawing::with_detections(&searched.picture, &searched.detections);
+        let drawn = searched.overlay();
         if raw {
             self.told(self.overlays.send(to_image(&drawn, header.clone())));
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Point2;
-use sdg_cell::{Found, Perception};
+use sdg_cell::{Found, Perception, drawing};
 use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspError, GraspModel, Verification};
 use sdg_ros2::found::FoundPart;
 use sdg_ros2::messages::Header;
@@ -42,6 +42,13 @@ impl Searched {
     pub(super) fn keep_by_setting(&mut self) {
         self.found.retain(|part| part.score >= self.min_score);
         self.detections.retain(|detection| detection.score >= self.min_score);
+    }
+
+    /// The picture with its detections drawn; those with at least the node's minimum score are accepted.
+    pub(super) fn overlay(&self) -> RgbImage {
+        let mut drawn = RgbImage::clone(&self.picture);
+        drawing::draw_detections(&mut drawn, self.detections.iter(), self.min_score, &[], Vec::new());
+        drawn
     }
 }
 
@@ -104,5 +111,46 @@ impl Searcher {
             picture: std::sync::Arc::clone(&picture.picture),
             search_secs: started.elapsed().as_secs_f64(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use sdg_geometry::{Angle, BoundingBox, PlanarGrasp};
+    use sdg_grasp::TurnSource;
+
+    use super::*;
+
+    #[test]
+    fn an_overlay_accepts_detections_from_the_minimum_score_of_the_node() {
+        let detection = GraspDetection {
+            demonstration_idx: 0,
+            score: 0.4,
+            network_score: 0.0,
+            agreement: Some(0.4),
+            evidence: None,
+            bbox: BoundingBox { x1: 100.0, y1: 100.0, x2: 200.0, y2: 180.0 },
+            keypoints: Vec::new(),
+            outline: None,
+            grasp: PlanarGrasp { x: 150.0, y: 140.0, angle: Angle::ZERO, width: 30.0 },
+            turn_source: TurnSource::Search,
+            light: 1.0,
+        };
+        let overlay = |min_score: f64| {
+            let searched = Searched {
+                header: Header::default(),
+                arrived: Instant::now(),
+                min_score,
+                found: Vec::new(),
+                detections: vec![detection.clone()],
+                picture: Arc::new(RgbImage::new(400, 300)),
+                search_secs: 0.1,
+            };
+            searched.overlay()
+        };
+        assert!(overlay(0.3) == overlay(0.4));
+        assert!(overlay(0.3) != overlay(0.5), "a refused detection is drawn in another colour");
     }
 }

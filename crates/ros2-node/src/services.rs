@@ -17,6 +17,7 @@ use sdg_ros2::messages::{
 use crate::camera_pose::CameraPoseReader;
 use crate::grasping::Grasping;
 use crate::lines::Lines;
+use crate::pictures::PictureReader;
 use crate::searching::Searched;
 use crate::teaching::{Teach, TeachJob, Teaching};
 
@@ -89,8 +90,21 @@ impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
 struct Detecting {
     asker: Client,
     request: DetectRequest,
+    wait: Wait,
+}
+
+/// The time in which a picture must arrive; its search may end later.
+struct Wait {
     asked: Instant,
     deadline: Instant,
+}
+
+impl Wait {
+    /// Whether the time is over and no picture has arrived since the request. A picture in the queue may be skipped, but
+    /// only for a newer one.
+    fn is_over(&self, now: Instant, newest_arrival: Option<Instant>) -> bool {
+        self.deadline < now && newest_arrival.is_none_or(|arrived| arrived < self.asked)
+    }
 }
 
 /// A taught model that the node is to use. Its client has no answer yet.
@@ -146,12 +160,12 @@ impl Services {
     /// [`Self::answer_use`] answers.
     pub(super) fn work(
         &mut self,
-        topic: &str,
+        reader: &PictureReader,
         model: Option<&sdg_grasp::GraspModel>,
         camera_pose: &CameraPoseReader,
     ) -> Option<Taught> {
         self.take_detections();
-        self.give_up_detections(topic);
+        self.give_up_detections(&reader.topic, reader.shared.newest_arrival());
         self.take_grasps(model, camera_pose);
         self.take_teachings();
         self.finish_teaching()
@@ -171,23 +185,25 @@ impl Services {
                 _ => DETECT_TIMEOUT,
             };
             let asked = Instant::now();
-            self.detecting.push(Detecting { asker, request, asked, deadline: asked + timeout });
+            self.detecting.push(Detecting { asker, request, wait: Wait { asked, deadline: asked + timeout } });
         }
     }
 
-    fn give_up_detections(&mut self, topic: &str) {
+    fn give_up_detections(&mut self, topic: &str, newest_arrival: Option<Instant>) {
         let now = Instant::now();
-        let (late, waiting) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.deadline < now);
+        let is_late = |one: &Detecting| one.wait.is_over(now, newest_arrival);
+        let (late, waiting) = std::mem::take(&mut self.detecting).into_iter().partition(is_late);
         self.detecting = waiting;
-        for Detecting { asker, asked, .. } in late {
-            let secs = asked.elapsed().as_secs_f64();
+        for Detecting { asker, wait, .. } in late {
+            let secs = wait.asked.elapsed().as_secs_f64();
             self.answer_detection(asker, Err(format!("no picture on {topic} within {secs:.1} s")));
         }
     }
 
     /// Answers the detection requests that were received before this picture arrived.
     pub(super) fn searched(&mut self, searched: Result<&Searched, String>, arrived: Instant) {
-        let (waiting, ready) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.asked > arrived);
+        let (waiting, ready) =
+            std::mem::take(&mut self.detecting).into_iter().partition(|one| one.wait.asked > arrived);
         self.detecting = waiting;
         for Detecting { asker, request, .. } in ready {
             let answer = searched.clone().map(|searched| detect_response(&request, searched));
@@ -331,6 +347,19 @@ mod tests {
     use sdg_ros2::found::FoundPart;
     use sdg_ros2::messages::Header;
     use std::time::Instant;
+
+    #[test]
+    fn a_request_waits_for_the_search_of_a_picture_that_arrived_in_time() {
+        let [early, asked, in_time, deadline, now] =
+            [0, 1, 2, 3, 4].map(|secs| Instant::now() + Duration::from_secs(secs));
+        let wait = Wait { asked, deadline };
+        for (newest_arrival, is_over) in
+            [(None, true), (Some(early), true), (Some(asked), false), (Some(in_time), false)]
+        {
+            assert_eq!(wait.is_over(now, newest_arrival), is_over);
+            assert!(!wait.is_over(in_time, newest_arrival));
+        }
+    }
 
     #[test]
     fn a_request_may_ask_for_lower_or_higher_scores_than_the_setting() {

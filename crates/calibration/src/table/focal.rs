@@ -91,17 +91,20 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point.
+    /// Error above the sheet's centre at that height, in metres; NaN if the picture does not show that point, or if no
+    /// other focal length can locate the sheet.
     pub at_sheet_m: f64,
-    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height.
+    /// Largest error along the picture's border, in metres, where the picture shows the plane at that height; NaN if no
+    /// other focal length can locate the sheet.
     pub at_border_m: f64,
 }
 
 /// Compares positions at a height for the given focal length with those for a longer and a shorter one. The pose is
-/// estimated again for each focal length.
+/// estimated again for each focal length. With another focal length, a tilt near the largest one may exceed it: only
+/// poses that can be estimated are compared.
 ///
 /// # Errors
-/// The errors of [`locate_sheet`].
+/// The errors of [`locate_sheet`] for the given focal length.
 pub fn focal_cost(
     camera: &PinholeCamera,
     board: &Board,
@@ -109,17 +112,16 @@ pub fn focal_cost(
     height_m: f64,
     focal_error: f64,
 ) -> Result<FocalCost, CalibrationError> {
-    let posed = |factor: f64| {
+    let posed = |factor: f64| -> Result<PosedCamera, CalibrationError> {
         let intrinsics = PinholeCamera { fx: camera.fx * factor, fy: camera.fy * factor, ..*camera };
         let world_from_camera = locate_sheet(&intrinsics, board, corners)?.sheet_from_camera;
         Ok(PosedCamera { intrinsics, world_from_camera })
     };
     let told = posed(1.0)?;
-    let others = [posed(1.0 + focal_error)?, posed(1.0 - focal_error)?];
+    let others: Vec<PosedCamera> = [1.0 + focal_error, 1.0 - focal_error].into_iter().flat_map(posed).collect();
     let moved = |pixel: &Point2<f64>| {
         let here = told.at_height(pixel, height_m)?;
-        let off = others.iter().filter_map(|other| Some((other.at_height(pixel, height_m)? - here).norm()));
-        Some(off.fold(0.0, f64::max))
+        others.iter().filter_map(|other| Some((other.at_height(pixel, height_m)? - here).norm())).reduce(f64::max)
     };
     let middle = told.project(&board.center().coords.push(height_m).into());
     let [width, height] = [camera.width, camera.height].map(f64::from);
@@ -130,7 +132,7 @@ pub fn focal_cost(
         focal_error,
         height_m,
         at_sheet_m: middle.and_then(|pixel| moved(&pixel)).unwrap_or(f64::NAN),
-        at_border_m: border.filter_map(|pixel| moved(&pixel.into())).fold(0.0, f64::max),
+        at_border_m: border.filter_map(|pixel| moved(&pixel.into())).reduce(f64::max).unwrap_or(f64::NAN),
     })
 }
 

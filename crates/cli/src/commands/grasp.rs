@@ -17,7 +17,7 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::{json_line, tell};
 use crate::live_pictures::{self, RequestArgs};
-use crate::robots::{self, Consent, RobotChoice, confirm, draw_dry_run, print_plan, write_states};
+use crate::robots::{self, Consent, RobotChoice, check_states, confirm, draw_dry_run, print_plan, write_states};
 use crate::shared_args::{ComputeArgs, ToldHeightArgs};
 
 /// `sdg grasp`
@@ -119,16 +119,14 @@ fn prepare(args: &GraspArgs) -> Result<GraspTask> {
         let found = args.max_detection_age_secs;
         return Err(Usage(format!("--max-detection-age-secs: expected a positive number, found {found}")).into());
     }
-    let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| {
-        Usage(format!("expected --camera FILE, or a file under [camera] in {}", args.workcell.display()))
-    })?;
+    let camera_path = robots::camera_file(args.camera.as_deref(), camera_of_workcell, &args.workcell)?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
     let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
-    sdg_files::check_replaceable(&args.states, None, b"time_secs")?;
+    check_states(&args.states)?;
     let settings = GraspSettings {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
@@ -222,7 +220,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
         Err(_) => true,
     };
     if has_failed || robot.latched().is_some() {
-        write_states(&args.states, robot.watch())?;
+        write_states(&args.states, robot.watch());
     }
     let ended = ended?;
     // Measured by the arm's own clock: a simulated arm moves faster or slower than a real one.

@@ -5,7 +5,7 @@ mod dry_run;
 #[cfg(feature = "simulation")]
 mod simulated_scene;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Result;
@@ -13,6 +13,7 @@ use sdg_robot::{Pace, RobotAddress, Scheduling, StopReason, Watch};
 
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;
+use crate::paint::{Paint, Tone};
 
 pub(crate) use confirm::{Consent, confirm};
 #[cfg(not(feature = "simulation"))]
@@ -59,6 +60,21 @@ impl RobotChoice {
     }
 }
 
+/// The camera file given on the command line, or else in the workcell file at `workcell`.
+///
+/// # Errors
+/// [`Usage`] if neither names one.
+pub(crate) fn camera_file(
+    option: Option<&Path>,
+    of_workcell: Option<PathBuf>,
+    workcell: &Path,
+) -> Result<PathBuf, Usage> {
+    option
+        .map(Path::to_path_buf)
+        .or(of_workcell)
+        .ok_or_else(|| Usage(format!("expected --camera FILE, or a file under [camera] in {}", workcell.display())))
+}
+
 /// Scheduling of the control loop of a real arm.
 pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
     if no_realtime { Scheduling::Ordinary } else { Scheduling::RealTime }
@@ -78,17 +94,24 @@ pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
     Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
 }
 
-/// Writes the arm's last second of states after an error and prints the file's path. Does nothing if no state was
-/// received.
+/// Checks, before anything moves, that [`write_states`] can write its file.
 ///
 /// # Errors
 /// The file cannot be written.
-pub(crate) fn write_states(path: &Path, watch: &Watch) -> Result<()> {
-    if watch.states().len() > 0 {
-        sdg_files::write(path, watch.states_csv().as_bytes())?;
-        eprintln!("the arm's last second: {}", path.display());
+pub(crate) fn check_states(path: &Path) -> Result<()> {
+    Ok(sdg_files::check_replaceable(path, None, b"time_secs")?)
+}
+
+/// Writes the arm's last second of states after an error and prints the file's path. Does nothing if no state was
+/// received. A file that cannot be written is a warning, which does not replace the arm's error.
+pub(crate) fn write_states(path: &Path, watch: &Watch) {
+    if watch.states().len() == 0 {
+        return;
     }
-    Ok(())
+    match sdg_files::write(path, watch.states_csv().as_bytes()) {
+        Ok(()) => eprintln!("the arm's last second: {}", path.display()),
+        Err(error) => eprintln!("{} {error}", Paint::stderr().text(Tone::Doubtful, "warning:")),
+    }
 }
 
 #[cfg(test)]

@@ -98,27 +98,26 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
     }
 
-    /// Stores and returns the accepted detection of a picture that was `taken` at this time; a target that the hand
-    /// cannot grasp is a failure.
+    /// Stores and returns the accepted detection of a picture that was `taken` at this time; a target that is not
+    /// finite is a failure.
     fn keep(&mut self, target: Option<GraspTarget>, taken: Option<Instant>) -> Steps<Option<GraspTarget>> {
         self.note_others();
         self.known.picture_time = taken;
         self.report.targets.push(target);
-        let Some(found) = target else { return Ok(None) };
-        let failed = |why: String| Stop::Failed(GraspStep::Detect, why);
-        let p = found.base_from_tcp.translation.vector;
-        if !(p.iter().all(|value| value.is_finite()) && found.jaw_width_m.is_finite()) {
-            return Err(failed("the grasp that was found is not finite".into()));
-        }
+        target.as_ref().map_or(Ok(()), check_is_finite)?;
+        Ok(target)
+    }
+
+    /// Fails for a target that the hand cannot grasp. A width in a picture is known only with the part's height.
+    pub(super) fn check_target(&self, target: &GraspTarget) -> Steps<()> {
+        check_is_finite(target)?;
         let opening_max_m = self.robot.geometry().hand.opening_max_m;
-        if found.jaw_width_m > opening_max_m {
-            return Err(failed(format!(
-                "the part is {:.0} mm wide, the hand opens {:.0} mm",
-                found.jaw_width_m * 1e3,
-                opening_max_m * 1e3
-            )));
+        if target.jaw_width_m <= opening_max_m {
+            return Ok(());
         }
-        Ok(Some(found))
+        let [width_mm, opening_mm] = [target.jaw_width_m, opening_max_m].map(|length_m| length_m * 1e3);
+        let why = format!("the part is {width_mm:.0} mm wide, the hand opens {opening_mm:.0} mm");
+        Err(Stop::Failed(GraspStep::Detect, why))
     }
 
     /// Stores the positions of the other parts in the last picture.
@@ -221,6 +220,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.move_freely(&solution.q, step)?;
         Ok(self.robot.wait(SETTLE_SECS)?)
     }
+}
+
+fn check_is_finite(target: &GraspTarget) -> Steps<()> {
+    let p = target.base_from_tcp.translation.vector;
+    if p.iter().all(|value| value.is_finite()) && target.jaw_width_m.is_finite() {
+        return Ok(());
+    }
+    Err(Stop::Failed(GraspStep::Detect, "the grasp that was found is not finite".to_owned()))
 }
 
 /// Horizontal distance between two detections, m.

@@ -30,7 +30,7 @@ use nalgebra::Point3;
 use sdg_kinematics::Trajectory;
 
 use crate::arm::{Arm, CompliantArm};
-use crate::arm_state::HandState;
+use crate::arm_state::{HandState, Load};
 use crate::camera_pose::CameraPose;
 use crate::error::{Result, RobotError};
 use crate::grasp_target::GraspTarget;
@@ -253,6 +253,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         self.check_hand()?;
+        self.reset_load()?;
         let first = self.look_around()?;
         let target = match self.cell.camera {
             CameraPose::OnFlange(_) => {
@@ -261,6 +262,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             }
             CameraPose::InBase(_) => first,
         };
+        self.check_target(&target)?;
         is_wanted(self, &target)?;
         self.take(&target)
     }
@@ -270,6 +272,16 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         if self.robot.hand()?.is_grasping {
             let why = "the hand still holds an object: open it first".to_owned();
             return Err(Stop::Failed(GraspStep::Detect, why));
+        }
+        Ok(())
+    }
+
+    /// Resets the load of the empty hand: an earlier program may have ended before it did so.
+    fn reset_load(&mut self) -> Steps<()> {
+        if self.cell.config.load.is_some() {
+            // An arm that may not move may refuse the load, without the reason why it may not move.
+            self.robot.ready()?;
+            self.robot.set_load(Load::NONE)?;
         }
         Ok(())
     }

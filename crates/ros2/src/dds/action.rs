@@ -166,20 +166,6 @@ where
         feedback.map(Some).map_err(|source| RosError::Malformed { topic: self.name.clone(), source })
     }
 
-    /// The newest status of a goal in the reports since the last call, 1 to 6 as in `action_msgs/msg/GoalStatus`;
-    /// `None` without a report of this goal.
-    ///
-    /// # Errors
-    /// Errors reported by the network.
-    pub fn status(&self, goal: &Goal) -> Result<Option<i8>, RosError> {
-        let mut status = None;
-        while let Some(all) = self.inner.receive_status().map_err(|error| network(&self.name, error))? {
-            let of_goal = all.status_list.iter().find(|one| one.goal_info.goal_id == goal.id);
-            status = of_goal.map(|one| one.status as i8).or(status);
-        }
-        Ok(status)
-    }
-
     /// Asks the server to cancel a goal; returns whether the server accepts.
     ///
     /// # Errors

@@ -228,10 +228,14 @@ fn report(
             )?;
         }
     }
+    let [at_sheet, at_border] = costs.map(|cost_mm| match cost_mm.is_nan() {
+        true => "an unknown error".to_owned(),
+        false => format!("{cost_mm:.1} mm"),
+    });
     writeln!(
         stdout,
-        "  an error of 10 % in the focal length gives, {} mm above the sheet: {:.1} mm at the sheet, {:.1} mm at the picture's border",
-        args.mark_height_mm, costs[0], costs[1]
+        "  an error of 10 % in the focal length gives, {} mm above the sheet: {at_sheet} at the sheet, {at_border} at the picture's border",
+        args.mark_height_mm
     )?;
     Ok(())
 }

@@ -10,7 +10,7 @@ use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load};
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::robots::{self, write_states};
+use crate::robots::{self, check_states, write_states};
 use crate::shared_args::opening_mm;
 
 /// Speed of the fingers relative to each other, in m/s.
@@ -50,6 +50,7 @@ pub struct CloseArgs {
 }
 
 pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
+    check_states(&args.states)?;
     let (mut arm, _) = args.arm.connect()?;
     let to = HandCommand::Move { opening_m: args.width_mm * 1e-3, speed_m_s: SPEED_M_S };
     let hand = command(&mut arm, to, &args.states)?;
@@ -63,6 +64,7 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     if !(1.0..=MAX_FORCE_N).contains(&args.force_n) {
         return Err(Usage(format!("--force-n: expected 1 to {MAX_FORCE_N}, found {}", args.force_n)).into());
     }
+    check_states(&args.states)?;
     let (mut arm, _) = args.arm.connect()?;
     let close = HandCommand::Grasp {
         width_m: ANY_WIDTH_M,
@@ -82,7 +84,7 @@ fn command(arm: &mut FrankaArm, command: HandCommand, states: &Path) -> Result<H
     arm.start_hand(command)?;
     let finished = arm.finish_hand(&mut watch);
     if finished.is_err() {
-        write_states(states, &watch)?;
+        write_states(states, &watch);
     }
     Ok(finished?)
 }

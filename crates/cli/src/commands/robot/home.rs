@@ -15,7 +15,7 @@ use sdg_robot::{
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::robots::{self, Consent, confirm, write_states};
+use crate::robots::{self, Consent, check_states, confirm, write_states};
 
 /// Length of the straight motion up with which an arm that is lower than the limits allow begins, m.
 const ASCENT_M: f64 = 0.030;
@@ -47,6 +47,8 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         let (mut arm, address) = args.arm.connect()?;
         if confirm(&format!("Move the fingers of the hand at {address}?"), args.yes)? == Consent::Given {
             arm.home_hand()?;
+            // The hand no longer holds an object.
+            arm.set_load(Load::NONE)?;
         }
         return Ok(Outcome::Done);
     }
@@ -55,6 +57,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     };
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
+    check_states(&args.states)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
     arm.check_model(workcell.robot)?;
@@ -96,7 +99,7 @@ fn move_along<A: Arm>(
 ) -> Result<()> {
     let moved = follow(robot, load, motions);
     if moved.is_err() {
-        write_states(states, robot.watch())?;
+        write_states(states, robot.watch());
     }
     Ok(moved?)
 }
@@ -188,7 +191,8 @@ mod tests {
     use sdg_kinematics::collision::{Obstacle, Shape};
     use sdg_kinematics::{ArmGeometry, IkOptions, JointLimits, JointVector};
     use sdg_robot::{
-        ArmState, CheckedMotion, HandCommand, HandState, LookOut, MotionEnd, PlannedAction, PlannedArm, Watch,
+        ArmState, CheckedMotion, HandCommand, HandState, LookOut, MotionEnd, PlannedAction, PlannedArm, StopReason,
+        Watch,
     };
 
     use super::*;
@@ -198,6 +202,8 @@ mod tests {
         arm: PlannedArm,
         sensitivity: ContactSensitivity,
         load_kg: Option<f64>,
+        /// Whether a person stops the arm at the start of a motion.
+        is_interrupted: bool,
     }
 
     impl Arm for Stopped {
@@ -209,6 +215,10 @@ mod tests {
         }
         fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> sdg_robot::Result<MotionEnd> {
             assert_eq!(self.sensitivity, ContactSensitivity::Free);
+            if self.is_interrupted {
+                watch.observe(&self.arm.state()?);
+                return Err(RobotError::Stopped(StopReason::Interrupted));
+            }
             self.arm.follow(motion, watch)
         }
         fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> sdg_robot::Result<()> {
@@ -248,11 +258,16 @@ mod tests {
         Workcell { look_outs: vec![LookOut::Joints(home)], ..workcell }
     }
 
-    /// Moves home; returns the arm.
-    fn go_home_from(q: &JointVector, workcell: &Workcell, is_grasping: bool) -> Result<Stopped> {
+    /// The arm at a position.
+    fn stopped_at(q: &JointVector, is_grasping: bool) -> Stopped {
         let hand = HandState { opening_m: 0.02, is_grasping, force_n: None };
         let arm = PlannedArm::new(ArmGeometry::panda(), *q, hand.opening_m).with_hand(hand);
-        let mut arm = Stopped { arm, sensitivity: ContactSensitivity::Contact, load_kg: None };
+        Stopped { arm, sensitivity: ContactSensitivity::Contact, load_kg: None, is_interrupted: false }
+    }
+
+    /// Moves home; returns the arm.
+    fn go_home_from(q: &JointVector, workcell: &Workcell, is_grasping: bool) -> Result<Stopped> {
+        let mut arm = stopped_at(q, is_grasping);
         let mut robot = Robot::new(&mut arm, workcell.safety_limits(), Watch::default());
         let pace = Pace::at_speed(0.1).unwrap();
         if let Some(ascent) = plan_ascent(&mut robot, workcell, &pace, is_grasping)? {
@@ -269,6 +284,18 @@ mod tests {
     /// Moves home from the ready pose.
     fn go_home(workcell: &Workcell, is_grasping: bool) -> Result<Stopped> {
         go_home_from(&ready_pose(), workcell, is_grasping)
+    }
+
+    #[test]
+    fn states_that_cannot_be_written_do_not_replace_the_error_of_the_arm() {
+        let workcell = workcell();
+        let mut arm = Stopped { is_interrupted: true, ..stopped_at(&ready_pose(), false) };
+        let mut robot = Robot::new(&mut arm, workcell.safety_limits(), Watch::default());
+        let motions = plan(&mut robot, &workcell, &Pace::at_speed(0.1).unwrap(), false).unwrap();
+        let states = Path::new("/nowhere/states.csv");
+        let error = move_along(&mut robot, Some(Load::NONE), motions, states).unwrap_err();
+        assert_eq!(robot.watch().states().len(), 1);
+        assert!(matches!(error.downcast_ref(), Some(RobotError::Stopped(StopReason::Interrupted))), "{error:#}");
     }
 
     #[test]

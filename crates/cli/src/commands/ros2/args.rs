@@ -14,7 +14,8 @@ pub struct Ros2Args {
     /// A grasp model written by sdg teach; without it, nothing is detected until the service has taught one
     #[arg(long, value_name = "FILE")]
     pub grasp_model: Option<PathBuf>,
-    /// The camera file, with the camera's pose above the table; without it and --base-frame, detections have no poses
+    /// The camera file, with the camera's pose above the table; without it and --base-frame, detections have no poses.
+    /// Default with --allow-motion: the file named in the workcell file
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
     /// Look up the camera's pose in tf, in this frame: the robot's base; intrinsics come from --camera or from
@@ -85,7 +86,7 @@ pub struct RosArgs {
 #[command(next_help_heading = "Grasping")]
 pub struct ArmArgs {
     /// Allow the service ~/grasp to move the arm for any caller; without it there is no such service
-    #[arg(long, requires_all = ["workcell", "camera"])]
+    #[arg(long, requires = "workcell")]
     pub allow_motion: bool,
     /// The workcell file
     #[arg(long, value_name = "FILE")]

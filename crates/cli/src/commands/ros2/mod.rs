@@ -17,7 +17,7 @@ use sdg_ros2_node::IsInterrupted;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use args::{ArmArgs, Ros2Args};
-use settings::{grasp_settings, node_settings};
+use settings::{CellFiles, grasp_settings, node_settings};
 
 /// Timeout for the arm's topic and actions.
 const ARM_TIMEOUT: Duration = Duration::from_secs(20);
@@ -26,15 +26,21 @@ const ARM_TIMEOUT: Duration = Duration::from_secs(20);
 pub fn run(args: &Ros2Args) -> Result<Outcome> {
     let naming = Naming::new(&args.ros.namespace, &args.ros.node_name, &args.ros.remappings).map_err(usage)?;
     let interrupt = Interrupt::watch();
-    let settings = node_settings(args, &interrupt)?;
-    let grasp = args.arm.allow_motion.then(|| grasp_settings(args)).transpose()?;
+    let files = CellFiles::read(args)?;
+    let settings = node_settings(args, &files, &interrupt)?;
+    let grasp = match &files {
+        CellFiles { workcell: Some(workcell), camera: Some(camera) } if args.arm.allow_motion => {
+            Some(grasp_settings(args, workcell, camera)?)
+        }
+        _ => None,
+    };
     watch_network_threads();
     let mut node = Node::join(NodeConfig {
         naming,
         domain_id: args.ros.domain_id.map_or_else(domain_of_environment, Ok).map_err(Usage)?,
         rmw: args.ros.rmw,
         is_loopback_only: args.ros.loopback,
-        parameters: parameters(args),
+        parameters: parameters(args, &files),
     })?;
     let arm = match grasp {
         Some(grasp) => {
@@ -68,11 +74,11 @@ fn arm_config(args: &ArmArgs, geometry: ArmGeometry) -> ArmConfig {
 }
 
 /// The parameters shown by `ros2 param get`.
-fn parameters(args: &Ros2Args) -> Vec<(String, String)> {
+fn parameters(args: &Ros2Args, files: &CellFiles) -> Vec<(String, String)> {
     let path = |path: &Option<PathBuf>| path.as_ref().map_or(String::new(), |path| path.display().to_string());
     vec![
         ("grasp_model".to_owned(), path(&args.grasp_model)),
-        ("camera".to_owned(), path(&args.camera)),
+        ("camera".to_owned(), path(&files.camera)),
         ("workcell".to_owned(), path(&args.arm.workcell)),
         ("base_frame".to_owned(), args.base_frame.clone().unwrap_or_default()),
         ("min_score".to_owned(), args.min_score.to_string()),

@@ -1,11 +1,14 @@
 //! The node's settings, read and checked before it joins ROS 2.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
+use sdg_geometry::Mount;
 use sdg_grasp::GraspError;
 use sdg_inputs::camera_files::{self, CameraFile};
 use sdg_inputs::{read_model, read_workcell};
+use sdg_robot::workcell::Workcell;
 use sdg_ros2::dds::Qos;
 use sdg_ros2_node::{CameraPoseSource, GraspInputs, Settings};
 
@@ -19,24 +22,51 @@ use crate::robots;
 /// Queue depth of the picture subscription.
 const PICTURE_DEPTH: usize = 10;
 
-/// Reads the files of the node.
+/// The files of the node's cell.
+pub(super) struct CellFiles {
+    /// The workcell.
+    pub(super) workcell: Option<Workcell>,
+    /// The path of the camera file.
+    pub(super) camera: Option<PathBuf>,
+}
+
+impl CellFiles {
+    /// Reads the workcell file, which also names the camera file if the arm may move and no other one is given.
+    ///
+    /// # Errors
+    /// The workcell file cannot be used, or a node whose arm may move has no camera file.
+    pub(super) fn read(args: &Ros2Args) -> Result<Self> {
+        let camera = args.camera.clone();
+        let Some(path) = &args.arm.workcell else { return Ok(Self { workcell: None, camera }) };
+        let (workcell, camera_of_workcell) = read_workcell(path)?;
+        let camera = match args.arm.allow_motion {
+            true => Some(robots::camera_file(camera.as_deref(), camera_of_workcell, path)?),
+            false => camera,
+        };
+        Ok(Self { workcell: Some(workcell), camera })
+    }
+
+    /// Whether the arm may move, and the camera with it.
+    fn is_camera_moved(&self, args: &Ros2Args) -> bool {
+        args.arm.allow_motion && self.workcell.as_ref().is_some_and(|workcell| workcell.mount == Mount::Hand)
+    }
+}
+
+/// Reads the other files of the node.
 ///
 /// # Errors
 /// A file cannot be used; a table height is given without a base frame; a model without lengths is given or is to be
 /// taught, although the node needs lengths.
-pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
+pub(super) fn node_settings(args: &Ros2Args, files: &CellFiles, interrupt: &Interrupt) -> Result<Settings> {
     check_trigger(args)?;
     let device = devices::open(&args.compute)?;
     let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
     if args.table_height_mm.is_some() && args.base_frame.is_none() {
         return Err(Usage("--table-height-mm: expected --base-frame, the frame of this height".to_owned()).into());
     }
-    let camera_pose = match (&args.base_frame, &args.camera) {
+    let camera_pose = match (&args.base_frame, &files.camera) {
         (Some(base_frame), camera) => {
-            let of_workcell = match &args.arm.workcell {
-                Some(path) => Some(read_workcell(path)?.0.table_height_m),
-                None => None,
-            };
+            let of_workcell = files.workcell.as_ref().map(|workcell| workcell.table_height_m);
             let told_m = args.table_height_mm.map(|height_mm| height_mm * 1e-3);
             CameraPoseSource::Transforms {
                 base_frame: base_frame.clone(),
@@ -44,10 +74,9 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
                 intrinsics: camera.as_deref().map(CameraFile::read_intrinsics).transpose()?,
             }
         }
-        // A camera on the hand has no fixed pose: only the grasp service gets poses from its pictures.
-        (None, Some(path)) if args.arm.allow_motion => {
-            CameraFile::read(path).map_or(CameraPoseSource::Unknown, |camera| CameraPoseSource::File(camera.over_table))
-        }
+        // A camera on the hand has no fixed pose, even if its file has one, such as that of the taught photos: only the
+        // grasp service gets poses from its pictures.
+        (None, Some(_)) if files.is_camera_moved(args) => CameraPoseSource::Unknown,
         (None, Some(path)) => CameraPoseSource::File(CameraFile::read(path)?.over_table),
         (None, None) => CameraPoseSource::Unknown,
     };
@@ -57,7 +86,7 @@ pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Se
     {
         return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
     }
-    let (camera, interrupt, teach_device) = (args.camera.clone(), interrupt.clone(), device.clone());
+    let (camera, interrupt, teach_device) = (files.camera.clone(), interrupt.clone(), device.clone());
     Ok(Settings {
         model,
         device,
@@ -87,21 +116,17 @@ fn check_trigger(args: &Ros2Args) -> Result<(), Usage> {
     Ok(())
 }
 
-/// Reads and checks the workcell and the camera of the grasp service, and checks the speed.
+/// Reads and checks the camera of the grasp service, and checks the speed.
 ///
 /// # Errors
-/// An option or a file is missing, a file cannot be used, or the speed is out of range.
-pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspInputs> {
-    let needed = |option: &str| Usage(format!("--allow-motion: expected {option} FILE"));
-    let workcell_path = args.arm.workcell.as_ref().ok_or_else(|| needed("--workcell"))?;
-    let (workcell, camera_of_workcell) = read_workcell(workcell_path)?;
+/// The camera file cannot be used, or the speed is out of range.
+pub(super) fn grasp_settings(args: &Ros2Args, workcell: &Workcell, camera: &Path) -> Result<GraspInputs> {
     robots::pace(args.arm.speed)?;
-    let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| needed("--camera"))?;
-    let (calibrated, _) = camera_files::read(&camera_path)?;
-    let camera = camera_files::mounted(&calibrated, &workcell, &camera_path)?;
+    let (calibrated, _) = camera_files::read(camera)?;
+    let camera = camera_files::mounted(&calibrated, workcell, camera)?;
     let base_frame = arm_base_frame(args);
     let told = args.arm.height.told(workcell.table_height_m);
-    Ok(GraspInputs { workcell, camera, told, speed: args.arm.speed, base_frame })
+    Ok(GraspInputs { workcell: workcell.clone(), camera, told, speed: args.arm.speed, base_frame })
 }
 
 /// The frame of the poses in responses of the grasp service: by default, the arm's base link.
@@ -111,8 +136,6 @@ fn arm_base_frame(args: &Ros2Args) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use clap::Parser;
     use sdg_ros2_node::TeachJob;
@@ -125,6 +148,30 @@ mod tests {
 
     fn parsed(line: &str) -> Result<Ros2Args, clap::Error> {
         Line::try_parse_from(line.split(' ')).map(|line| line.ros2)
+    }
+
+    fn shipped(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name)
+    }
+
+    /// A node that moves the arm of the shipped workcell, whose camera is on the hand.
+    fn moving() -> Ros2Args {
+        let mut args = parsed("ros2 --allow-motion --workcell cell.toml").unwrap();
+        args.arm.workcell = Some(shipped("workcell/workcell.toml"));
+        args
+    }
+
+    #[test]
+    fn a_camera_on_the_hand_has_no_fixed_pose_even_if_its_file_has_one() {
+        let args = moving();
+        let files = CellFiles::read(&args).unwrap();
+        let camera = shipped("workcell/camera.yaml");
+        assert_eq!(files.camera.as_ref(), Some(&camera), "the file named in the workcell file");
+        CameraFile::read(&camera).unwrap();
+        let source = |files: &CellFiles| node_settings(&args, files, &Interrupt::default()).unwrap().camera_pose;
+        assert!(matches!(source(&files), CameraPoseSource::Unknown));
+        let workcell = files.workcell.map(|workcell| Workcell { mount: Mount::Base, ..workcell });
+        assert!(matches!(source(&CellFiles { workcell, camera: files.camera }), CameraPoseSource::File(_)));
     }
 
     #[test]
@@ -154,7 +201,6 @@ mod tests {
     #[test]
     fn a_node_with_a_camera_on_the_hand_rejects_a_model_without_lengths() {
         let folder = tempfile::tempdir().unwrap();
-        let shipped = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name);
         let job = TeachJob {
             photo: shipped("demonstrations/pendulum/image.png").display().to_string(),
             marks: Some(shipped("demonstrations/pendulum/annotation.json")),
@@ -165,18 +211,12 @@ mod tests {
             mark_height_mm: None,
             is_used: true,
         };
-        let with_model = |line: &str| Ros2Args { grasp_model: Some(job.out.clone()), ..parsed(line).unwrap() };
-        let (without_poses, interrupt) = (with_model("ros2"), Interrupt::default());
+        let with_model = |args: Ros2Args| Ros2Args { grasp_model: Some(job.out.clone()), ..args };
+        let (without_poses, interrupt) = (with_model(parsed("ros2").unwrap()), Interrupt::default());
+        let settings = |args: &Ros2Args| node_settings(args, &CellFiles::read(args).unwrap(), &interrupt);
         teach(&job, &devices::open(&without_poses.compute).unwrap(), None, &interrupt).unwrap();
-        assert!(node_settings(&without_poses, &interrupt).is_ok());
-
-        // A camera on the hand has no fixed pose above the table.
-        let camera = std::fs::read_to_string(shipped("workcell/camera.yaml")).unwrap();
-        let on_hand = folder.path().join("camera.yaml");
-        std::fs::write(&on_hand, camera.split("\ntable:").next().unwrap()).unwrap();
-        let grasping = with_model("ros2 --allow-motion --workcell cell.toml --camera camera.yaml");
-        let grasping = Ros2Args { camera: Some(on_hand), ..grasping };
-        let error = node_settings(&grasping, &interrupt).err().unwrap();
+        assert!(settings(&without_poses).is_ok());
+        let error = settings(&with_model(moving())).err().unwrap();
         assert!(matches!(error.downcast_ref(), Some(GraspError::NoLengths)), "{error:#}");
     }
 }

@@ -177,6 +177,34 @@ fn a_told_height_is_used_where_there_is_no_other_and_refused_where_it_contradict
     assert_eq!(report.height.unwrap().settled.unwrap().source, HeightSource::Measured);
 }
 
+/// The outcome for a part that has these widths at the height that its detections assume and at the measured one, and
+/// the number of motions.
+fn grasped_of_width(assumed_m: f64, measured_m: f64) -> (GraspOutcome, usize) {
+    let config = config(None);
+    let mut arm = PlannedArm::new(ArmGeometry::panda(), ready_pose(), 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let of_width = |higher_m: f64, jaw_width_m: f64| GraspTarget { jaw_width_m, ..part(higher_m) };
+    let known = KnownTarget::new(Some(of_width(0.020, measured_m)), camera(), &config);
+    let seen = of_width(0.025, assumed_m);
+    let mut finder = Shown { known, seen, shows: Vec::new(), num_sights: 0, sees_surface: true, turned_rad: 0.0 };
+    let outcome = grasp(&mut robot, &mut finder, &mut (), camera(), &config).unwrap().outcome;
+    (outcome, arm.actions().iter().filter(is_motion).count())
+}
+
+fn is_motion(action: &&PlannedAction) -> bool {
+    matches!(action, PlannedAction::Motion(_))
+}
+
+#[test]
+fn the_width_at_the_measured_height_decides() {
+    let (outcome, num_motions) = grasped_of_width(0.079, 0.082);
+    let GraspOutcome::Failed { step: GraspStep::Detect, why } = outcome else { panic!("{outcome:?}") };
+    assert_eq!(why, "the part is 82 mm wide, the hand opens 80 mm");
+    // The motions to the look-out pose, to above the part and to both sides of it, but none down to it.
+    assert_eq!(num_motions, 4);
+    assert_eq!(grasped_of_width(0.082, 0.079).0, GraspOutcome::Held);
+}
+
 /// Finds the part; the picture from above it is a minute old.
 struct Late {
     num_pictures: usize,
@@ -201,7 +229,6 @@ fn an_old_picture_starts_no_motion_to_any_position_beside_the_part() {
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
     assert!(why.contains("the detection is "), "{why}");
     // Only the motions to the look-out pose and to above the part.
-    let is_motion = |action: &&PlannedAction| matches!(action, PlannedAction::Motion(_));
     assert_eq!(arm.actions().iter().filter(is_motion).count(), 2);
 }
 

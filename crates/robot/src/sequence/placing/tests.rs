@@ -158,8 +158,8 @@ fn a_part_lies_where_it_was_to_lie() {
         let error = beside(&goal.base_from_part(0.02, 0.0), &cell.base_from_part, RotationalSymmetry::None);
         assert!(error.distance_m() < 1e-4 && error.angle_rad.abs() < 1e-4, "{error:?}");
         assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
-        // The load is set while the part is held, and reset afterwards.
-        assert_eq!(cell.loads_kg, [0.3, 0.0]);
+        // The load is set while the part is held, and reset before and afterwards.
+        assert_eq!(cell.loads_kg, [0.0, 0.3, 0.0]);
     }
 }
 
@@ -313,6 +313,26 @@ impl StepObserver<Cell> for Begun {
     }
 }
 
+/// Records the loads that were set before the first step.
+struct FirstLoads(Option<Vec<f64>>);
+
+impl StepObserver<Cell> for FirstLoads {
+    fn before(&mut self, cell: &mut Cell, _step: GraspStep) -> Result<()> {
+        self.0.get_or_insert_with(|| cell.loads_kg.clone());
+        Ok(())
+    }
+}
+
+#[test]
+fn the_load_of_an_earlier_program_is_reset_before_anything_moves() {
+    let mut cell = cell(Isometry3::identity());
+    cell.loads_kg.push(0.5);
+    let (mut first, camera) = (FirstLoads(None), CameraPose::InBase(Isometry3::identity()));
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    grasp(&mut robot, &mut Truth, &mut first, camera, &config()).unwrap();
+    assert_eq!(first.0, Some(vec![0.5, 0.0]));
+}
+
 #[test]
 fn an_observer_is_called_before_each_step() {
     use GraspStep::{Approach, Carry, Check, Close, Detect, Hold, Lift, PutDown, Release};
@@ -403,7 +423,7 @@ fn where_nothing_is_felt_the_part_stays_in_the_hand() {
     let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("no contact was measured") && why.contains("still held"), "{why}");
-    assert_eq!(cell.loads_kg, [0.3]);
+    assert_eq!(cell.loads_kg, [0.0, 0.3]);
     assert!(matches!(cell.arm.actions().last(), Some(PlannedAction::Down { .. })), "{:?}", cell.arm.actions().last());
 }
 
