@@ -31,14 +31,16 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.from.is_some() && !args.images.is_empty() {
         return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
     }
-    if args.from.is_some() && args.min_score != DEFAULT_MIN_SCORE && !args.every_frame && !args.no_verify {
+    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let verification = verification(args.no_verify, &model);
+    let is_tracked = args.from.is_some() && !args.every_frame && verification != Verification::Off;
+    if is_tracked && args.min_score != DEFAULT_MIN_SCORE {
         return Err(Usage(
             "--min-score: expected images, or live pictures with --every-frame, found live pictures with tracking"
                 .to_owned(),
         )
         .into());
     }
-    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if let Some(tolerance) = args.size_tolerance {
         model = model.with_size_tolerance(tolerance.range())?;
     }
@@ -56,13 +58,13 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         Some(RegionArg::Part(region)) => detector.look_in(Some(region)).context("--region")?,
     }
     if let Some(address) = &args.from {
-        return live::run(args, address, detector);
+        return live::run(args, address, detector, verification);
     }
     inputs::check_standard_input(&args.images)?;
     let mut batch = Batch {
         args,
         detector: &detector,
-        verification: verification(args.no_verify, detector.model()),
+        verification,
         drawn: DrawnNames::of([]),
         num_used: 0,
         num_failed: 0,
