@@ -62,5 +62,5 @@ pub use region_record::RegionRecord;
 pub use sdg_robot::CameraPose;
 pub use searched_picture::{ExplainedRecord, PictureRecord, SearchedPicture};
 pub use sequence_run::{Ended, run_sequence};
-pub use words::{DetectionWords, advice_for, advice_in_words, without_minus_zero};
+pub use words::{DetectionWords, advice_in_words, without_minus_zero};
 pub use workcell_map::WorkcellMap;

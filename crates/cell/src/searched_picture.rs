@@ -99,7 +99,7 @@ impl SearchedPicture {
         let explained = |(found, jaws_touch): (&&Found, Vec<usize>)| ExplainedRecord {
             found: FoundRecord::new(found, detector),
             size: detector.size_of(&found.detection, self.size),
-            advice: found.detection.advice().map(advice_in_words),
+            advice: found.detection.advice(words.score_config()).map(advice_in_words),
             jaws_touch,
         };
         let [width, height] = self.size;

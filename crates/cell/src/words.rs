@@ -1,6 +1,6 @@
 //! Texts about the detections in a picture: their positions, and the reasons for refusals.
 
-use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
+use sdg_grasp::{Advice, EvidenceKind, GraspDetection, ScoreConfig};
 
 use crate::perception::{Found, Perception};
 
@@ -11,25 +11,23 @@ const MIN_ADVISED_SCORE: f64 = 0.03;
 const MAX_EXPLAINED: usize = 3;
 
 /// The advice, in words, for a refused detection that may be the part. `demonstration` is the word for another
-/// demonstration, `on_size` the advice for a part of a different size.
-pub fn advice_in_words(advice: Advice, demonstration: &str, on_size: &str) -> String {
+/// demonstration, `on_lengths` the advice for a part of a different size than the known one.
+pub fn advice_in_words(advice: Advice, demonstration: &str, on_lengths: &str) -> String {
     let light = |here: &str| {
         format!(
             "if it is the part, it is {here} here than in the photo: a second {demonstration} in this light would help"
         )
     };
     match advice {
-        Advice::CheckSize => on_size.to_owned(),
+        Advice::OneHeight => format!(
+            "if it is the part, lay the parts at one height, or a second {demonstration} from this distance would help"
+        ),
+        Advice::CheckLengths => on_lengths.to_owned(),
         Advice::DarkerPhoto => light("darker"),
         Advice::BrighterPhoto => light("brighter"),
         Advice::Uncover => format!("if it is the part, uncover it, or add a {demonstration} taken from this side"),
         Advice::OtherSide => format!("if it is the part, a second {demonstration} taken from this side would help"),
     }
-}
-
-/// The advice for a refused detection, if it resembles the part.
-pub fn advice_for(detection: &GraspDetection) -> Option<Advice> {
-    detection.advice().filter(|_| resembles_the_part(detection))
 }
 
 fn resembles_the_part(detection: &GraspDetection) -> bool {
@@ -105,10 +103,20 @@ impl DetectionWords<'_> {
         worth_it.map(|(_, (idx, _))| idx).take(MAX_EXPLAINED).collect()
     }
 
+    /// The weights by which the detections were scored.
+    pub(crate) fn score_config(&self) -> &ScoreConfig {
+        &self.detector.model().demonstrations()[0].check().score
+    }
+
+    /// The advice for a refused detection, if it resembles the part.
+    pub fn advice_for(&self, detection: &GraspDetection) -> Option<Advice> {
+        detection.advice(self.score_config()).filter(|_| resembles_the_part(detection))
+    }
+
     /// The strongest reasons for refusing a detection, in words, at most `most` of them.
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
-        let config = &self.detector.model().demonstrations()[0].check().score;
+        let config = self.score_config();
         let in_words = |kind: EvidenceKind| match kind {
             // Without a known size, parts are compared with each other, and not with the photo.
             EvidenceKind::Size if !config.is_size_known => "it has another size than the surest part in the picture",
@@ -147,8 +155,14 @@ mod tests {
         let mut found = detector.detect(&photo, Verification::ByShape).unwrap().swap_remove(0).detection;
         // As beside a part of clearly another size.
         found.evidence.as_mut().unwrap().size = -9.0;
+        found.score = 0.2;
         let words = DetectionWords { detector: &detector, picture_size: photo.dimensions().into(), min_score: 0.5 };
         assert_eq!(words.reasons(&found, 1), "it has another size than the surest part in the picture");
+        // A size tolerance limits the searched sizes and has no effect on this comparison.
+        let advice = words.advice_for(&found).map(|advice| advice_in_words(advice, "--demo", "check the camera"));
+        let expected =
+            "if it is the part, lay the parts at one height, or a second --demo from this distance would help";
+        assert_eq!(advice.as_deref(), Some(expected));
     }
 
     #[test]

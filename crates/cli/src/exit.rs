@@ -155,6 +155,7 @@ mod tests {
     fn only_a_closed_output_is_no_failure() {
         let closed = || io::Error::from(io::ErrorKind::BrokenPipe);
         assert!(is_closed_pipe(&closed().into()));
+        assert!(is_closed_pipe(&anyhow::Error::from(closed()).context("standard output")));
         let of_another_stream = sdg_camera::CameraError::Port { port: 0, source: closed() };
         assert!(!is_closed_pipe(&of_another_stream.into()));
     }

@@ -1,15 +1,13 @@
 //! The text line of a detection, with colours and options.
 
-use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, Part, advice_for, advice_in_words, track_state_name};
+use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, Part, advice_in_words, track_state_name};
 use sdg_grasp::{Advice, GraspDetection};
 
 use crate::paint::{Paint, Tone};
 
 /// The advice with the options of the command line.
 pub fn advice_with_options(advice: Advice) -> String {
-    const ON_SIZE: &str =
-        "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm";
-    advice_in_words(advice, "--demo", ON_SIZE)
+    advice_in_words(advice, "--demo", "if it is the part, check the file of --camera and --mark-height-mm")
 }
 
 /// Makes the lines about the detections in a picture.
@@ -71,7 +69,7 @@ impl FoundText<'_> {
         if detection.score >= DEFAULT_MIN_SCORE {
             return Some(format!("it scores below --min-score {}", self.words.min_score));
         }
-        let advice = advice_for(detection).map(|advice| format!("; {}", advice_with_options(advice)));
+        let advice = self.words.advice_for(detection).map(|advice| format!("; {}", advice_with_options(advice)));
         Some(format!("{}{}", self.words.reasons(detection, 2), advice.unwrap_or_default()))
     }
 
@@ -88,7 +86,7 @@ impl FoundText<'_> {
         let (x, y) = (best.grasp.x, best.grasp.y);
         let why = self.refusal(best).unwrap_or_default();
         // Beside other advice, the hint about the size is left out, because it would contradict the advice.
-        let other_size = advice_for(best).map_or_else(|| self.of_other_size(), |_| None);
+        let other_size = self.words.advice_for(best).map_or_else(|| self.of_other_size(), |_| None);
         format!(
             "{}{region}; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
             self.doubtful("nothing accepted"),

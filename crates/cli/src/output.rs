@@ -33,13 +33,26 @@ pub fn print_stdout(text: Arguments<'_>) {
     }
 }
 
+/// The first error since the last call.
+fn take_error() -> Option<io::Error> {
+    ERROR.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+/// For work whose only results are printed: it need not go on after an error of standard output.
+///
+/// # Errors
+/// A text could not be written.
+pub fn check() -> Result<()> {
+    take_error().map_or(Ok(()), Err).context("standard output")
+}
+
 /// Writes the rest of standard output at the end of a command.
 ///
 /// # Errors
 /// A text could not be written, and not because the reader closed the pipe, as `head` does.
 pub fn finish() -> Result<()> {
     let flushed = stdout().flush();
-    match ERROR.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(flushed, Err) {
+    match take_error().map_or(flushed, Err) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         written => written.context("standard output"),
     }

@@ -94,7 +94,12 @@ fn pictures_of_a_folder_and_on_request_show_what_files_show() {
     };
     let expected: Vec<Vec<Value>> = detect(&[frames.to_str().unwrap()]);
     assert_eq!(expected.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1, 0, 1]);
-    assert_eq!(detect(&["--from", &format!("dir:{}", frames.display())]), expected);
+    let from = format!("dir:{}", frames.display());
+    assert_eq!(detect(&["--from", &from]), expected);
+    // Model S has no network that could decide alone, and its parts are still tracked.
+    let unverified = ["detect", "--grasp-model", &model, "--json", "--from", &from, "--no-verify"];
+    assert_eq!(lines(&sdg(&[&unverified[..], &["--frames", "1"]].concat()))[0]["detections"][0]["track"], 0);
+    assert_eq!(sdg(&[&unverified[..], &["--min-score", "0.4"]].concat()).status.code(), Some(2));
     let line = &lines(&sdg(&["detect", "--grasp-model", &model, "--json", frames.join("0.png").to_str().unwrap()]))[0];
     let detection = &line["detections"][0];
     assert_eq!((&line["object"], &detection["network_score"]), (&"pendulum".into(), &Value::Null), "{line}");

@@ -4,8 +4,10 @@ use std::fs::{self, File};
 use std::io::PipeWriter;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
+use std::slice::from_ref;
 
 use crate::support::{Folder, shipped, taught_pendulum};
+use crate::weights::{config, fixture};
 
 fn run(arguments: &[&str], stdout: impl Into<Stdio>, stderr: impl Into<Stdio>) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).stdout(stdout).stderr(stderr).output().unwrap()
@@ -54,19 +56,37 @@ fn a_closed_output_ends_no_work_and_a_full_one_is_an_error() {
     let demo = format!("{}:{marks}", photo.display());
     let teach = ["teach", "--model", "S", "--demo", &demo, "--out", &model];
     let convert = ["annotation", "convert", marks, &converted, "--format", "labelme"];
-    for (arguments, written) in [(&teach[..], Some(&model)), (&plan()[..], None), (&convert[..], Some(&converted))] {
+    let (known, drawn, frames) = (folder.path("known.sdg"), folder.path("drawn"), folder.path("frames"));
+    taught_pendulum(&known, None);
+    let photo = photo.to_str().unwrap();
+    let detect = ["detect", "--grasp-model", &known, photo, photo];
+    let draw = [&detect[..], &["--draw", &drawn]].concat();
+    let drawings = ["drawn/image.png", "drawn/image-2.png"].map(|name| folder.path(name));
+    let from = format!("file:{photo}?loop");
+    let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &frames];
+    let grabbed = ["frames/000000.png", "frames/000001.png"].map(|name| folder.path(name));
+    let (checkpoint, weights) = (fixture("detectron2_keypoint.pkl"), folder.path("weights.safetensors"));
+    let network = config(Path::new(&folder.path("")), 1);
+    let convert_weights = ["weights", "convert", &checkpoint, &weights, "--config", network.to_str().unwrap()];
+    for (arguments, written) in [
+        (&teach[..], from_ref(&model)),
+        (&plan()[..], &[][..]),
+        (&convert[..], from_ref(&converted)),
+        (&detect[..], &[][..]),
+        (&draw[..], &drawings[..]),
+        (&grab[..], &grabbed[..]),
+        (&convert_weights[..], from_ref(&weights)),
+    ] {
         let output = run(arguments, closed_pipe(), Stdio::piped());
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(0) && !stderr.contains("panicked"), "{arguments:?}: {stderr}");
 
-        if let Some(written) = written {
-            fs::remove_file(written).unwrap();
-        }
+        written.iter().for_each(|file| fs::remove_file(file).unwrap());
         let output = run(arguments, full_disk(), Stdio::piped());
         let stderr = String::from_utf8(output.stderr).unwrap();
         let error = stderr.lines().last().unwrap_or_default();
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
         assert!(error.starts_with("sdg: standard output: No space left"), "{arguments:?}: {stderr}");
-        assert!(written.is_none_or(|written| Path::new(written).exists()), "{arguments:?}");
+        assert!(written.iter().all(|file| Path::new(file).exists()), "{arguments:?}");
     }
 }

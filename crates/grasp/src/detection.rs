@@ -6,6 +6,7 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
 use sdg_shape::CloseLook;
 
+use crate::check_config::ScoreConfig;
 use crate::colors::Colors;
 use crate::evidence_kind::{Advice, EvidenceKind};
 use crate::facts::TurnSource;
@@ -72,10 +73,11 @@ impl GraspDetection {
         Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
     }
 
-    /// The further demonstration, or the setting, that would help if a refused detection is the part after all.
-    pub fn advice(&self) -> Option<Advice> {
+    /// The further demonstration, or the setting, that would help if a refused detection is the part after all;
+    /// `config` is the one by which it was scored.
+    pub fn advice(&self, config: &ScoreConfig) -> Option<Advice> {
         let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
-        evidence.advice(self.light)
+        evidence.advice(self.light, config)
     }
 }
 

@@ -85,8 +85,11 @@ impl EvidenceKind {
 /// options or buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Advice {
-    /// A wider size tolerance or, with a calibrated camera, a check of the camera file and of the height of the marks.
-    CheckSize,
+    /// Parts at one height, or a further photo from this distance: the part has another size than the surest one in the
+    /// picture.
+    OneHeight,
+    /// With a calibrated camera: a check of the camera file and of the height of the marks.
+    CheckLengths,
     /// A further photo in the picture's light, in which the part is darker than in the demonstration.
     DarkerPhoto,
     /// A further photo in the picture's light, in which the part is brighter than in the demonstration.

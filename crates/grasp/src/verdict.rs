@@ -108,7 +108,7 @@ impl Contributions {
 
     /// The further demonstration, or the setting, that would help if this is the part after all; `light` is the
     /// brightness over that of the demonstration. `None` if neither would help.
-    pub(crate) fn advice(&self, light: f64) -> Option<Advice> {
+    pub(crate) fn advice(&self, light: f64, config: &ScoreConfig) -> Option<Advice> {
         // Outside this range of `light` the illumination differs. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
@@ -120,7 +120,8 @@ impl Contributions {
             None
         };
         match self.strongest_objection()? {
-            EvidenceKind::Size => Some(Advice::CheckSize),
+            EvidenceKind::Size if config.is_size_known => Some(Advice::CheckLengths),
+            EvidenceKind::Size => Some(Advice::OneHeight),
             EvidenceKind::Outside | EvidenceKind::Network | EvidenceKind::Resemblance => None,
             EvidenceKind::Visible => on_light.or(Some(Advice::Uncover)),
             EvidenceKind::Edges
@@ -330,7 +331,8 @@ pub(crate) mod tests {
 
     #[test]
     fn the_photo_that_would_help_depends_on_the_objection_and_the_light() {
-        let of = |clues: Clues, light: f64| judge(&clues, None, &ScoreConfig::DEFAULT).1.advice(light);
+        let config = ScoreConfig::DEFAULT;
+        let of = |clues: Clues, light: f64| judge(&clues, None, &config).1.advice(light, &config);
         let plain = Clues { evidence: Evidence { surface: Some(0.0), edges: 0.5, ..clear().evidence }, ..clear() };
         assert_eq!(of(plain, 1.0), Some(Advice::OtherSide));
         assert_eq!([of(plain, 0.4), of(plain, 2.0)], [Some(Advice::DarkerPhoto), Some(Advice::BrighterPhoto)]);
@@ -338,6 +340,11 @@ pub(crate) mod tests {
         assert_eq!(of(covered, 1.0), Some(Advice::Uncover));
         let cut = Clues { evidence: Evidence { outside: 0.4, ..clear().evidence }, ..clear() };
         assert_eq!(of(cut, 1.0), None);
+        // The size that decides is that of the surest part, or with a calibrated camera that of the photo.
+        let larger = Clues { log_size: 0.2, ..clear() };
+        let of_size = |config: ScoreConfig| judge(&larger, Some(0.0), &config).1.advice(1.0, &config);
+        assert_eq!(of_size(config), Some(Advice::OneHeight));
+        assert_eq!(of_size(config.of_known_size()), Some(Advice::CheckLengths));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use image::RgbImage;
 use sdg_annotate::{FoundGrasp, GraspPose, Refusal, Region, TaughtModel, TaughtSummary, TeacherError};
 use sdg_calibration::Frame;
-use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, Perception, advice_for, advice_in_words};
+use sdg_cell::{DEFAULT_MIN_SCORE, DetectionWords, Found, Perception, advice_in_words};
 use sdg_grasp::{Advice, PlanarPose, Verification};
 
 use crate::region::{page_region, search_region};
@@ -98,7 +98,7 @@ fn found_grasp(found: &Found, words: &DetectionWords<'_>) -> FoundGrasp {
         pose: found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| grasp_pose(pose, frame)),
         refusal: (!detection.is_accepted()).then(|| Refusal {
             reason: words.reasons(detection, 2),
-            remedy: advice_for(detection).map(remedy),
+            remedy: words.advice_for(detection).map(remedy),
             ..Refusal::default()
         }),
         touches: Vec::new(),

@@ -52,7 +52,8 @@ pub struct TeachArgs {
     pub parts: Vec<String>,
     /// A picture without the part, preferably one with a false detection. It is used in teaching, and the score is
     /// calibrated so that nothing is accepted in it, as long as nine in ten parts in held-out samples are still
-    /// accepted; else the picture does not change the score, and a warning names it. Repeat for several
+    /// accepted; else a warning names it; model S is then as without it, but a network has learnt from it. Repeat for
+    /// several
     #[arg(long = "negative", value_name = "IMAGE")]
     pub negatives: Vec<PathBuf>,
     /// The file to write

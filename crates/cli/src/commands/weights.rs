@@ -128,9 +128,8 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
     let precision = if args.f16 { Precision::F16 } else { Precision::F32 };
     let paths = [args.input.as_path(), args.output.as_path()];
     let report = conversion.report();
-    let mut stdout = std::io::stdout().lock();
     if !args.json {
-        write!(stdout, "{report}")?;
+        print!("{report}");
     }
     let written = conversion.write(&checkpoint, &mut source, paths, precision, &metadata);
     let seconds = clock::elapsed_secs();
@@ -144,12 +143,11 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
             "written": written.as_ref().ok(),
             "report": report,
         });
-        writeln!(stdout, "{line}")?;
+        println!("{line}");
     }
     let written = written.with_context(named)?;
     if !args.json {
-        writeln!(
-            stdout,
+        println!(
             "wrote {} from {} ({}, names of {}): {}; {} values, {} bytes, {seconds:.1} s",
             args.output.display(),
             args.input.display(),
@@ -158,7 +156,7 @@ fn convert(args: &ConvertArgs) -> Result<Outcome> {
             report.summary(),
             conversion.num_parameters(),
             written.bytes,
-        )?;
+        );
     }
     Ok(Outcome::Done)
 }
@@ -206,11 +204,10 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     let device = devices::open(&args.compute)?;
     let verified = verify_checkpoint(&args.file, config, &image, &args.against, &device);
     let report = verified.map_err(|error| in_options(error, "--config"))?;
-    let mut stdout = std::io::stdout().lock();
     if args.json {
-        writeln!(stdout, "{}", json!({"passed": report.passed(), "stages": report.stages}))?;
+        println!("{}", json!({"passed": report.passed(), "stages": report.stages}));
     } else {
-        write!(stdout, "{report}")?;
+        print!("{report}");
     }
     match report.stages.iter().find(|stage| !stage.passed) {
         None if report.passed() => Ok(Outcome::Done),

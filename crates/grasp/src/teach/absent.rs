@@ -12,9 +12,9 @@ use std::ops::RangeInclusive;
 use image::{RgbImage, imageops};
 use sdg_demonstration::random::scramble;
 use sdg_demonstration::{
-    Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle, output_size_of,
+    AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle, output_size_of,
 };
-use sdg_geometry::{BoundingBox, PlanarSimilarity, percentile};
+use sdg_geometry::{BoundingBox, percentile};
 
 use super::options::TeachOptions;
 use crate::decimal::decimal;
@@ -23,7 +23,6 @@ use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::taught::TaughtDemonstration;
-use crate::taught_marks::extent;
 
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
 /// hand, not measured.
@@ -180,38 +179,10 @@ fn augmenter(
     if options.lengths.is_none() || !demonstrations.iter().any(is_reduced) {
         return Ok(Augmenter::new(demonstrations, config, options.seed)?);
     }
-    let parts = demonstrations.iter().map(|demonstration| extent_of(&demonstration.annotation));
+    let parts = demonstrations.iter().map(|demonstration| demonstration.annotation.extent());
     let side = parts.map(|part| 2.0 * part.width().max(part.height())).fold(MIN_SURROUNDINGS_PX, f64::max);
-    let cut: Vec<_> = demonstrations.iter().map(|demonstration| surroundings(demonstration, side as u32)).collect();
+    let cut: Vec<_> = demonstrations.iter().map(|demonstration| demonstration.cropped([side as u32; 2])).collect();
     Ok(Augmenter::new(&cut, config, options.seed)?)
-}
-
-fn extent_of(annotation: &Annotation) -> BoundingBox {
-    annotation.grasp.map_or(annotation.bbox, |grasp| extent(&annotation.bbox, &grasp))
-}
-
-/// The part's surroundings in the photo, `side` pixels wide and high, or as many as the photo has.
-fn surroundings(demonstration: &Demonstration, side: u32) -> Demonstration {
-    let Demonstration { image, annotation } = demonstration;
-    let center = extent_of(annotation).center();
-    let range = |center: f64, whole: u32| {
-        let length = side.min(whole);
-        let start = (center - 0.5 * f64::from(length)).round().clamp(0.0, f64::from(whole - length));
-        (start as u32, length)
-    };
-    let ((left, width), (top, height)) = (range(center.x, image.width()), range(center.y, image.height()));
-    let to_cut = PlanarSimilarity::translation(-f64::from(left), -f64::from(top));
-    let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
-    let [x1, x2] = [x1, x2].map(|x| x - f64::from(left));
-    let [y1, y2] = [y1, y2].map(|y| y - f64::from(top));
-    let annotation = Annotation {
-        label: annotation.label.clone(),
-        bbox: BoundingBox { x1, y1, x2, y2 },
-        grasp: annotation.grasp.map(|grasp| grasp.transformed(&to_cut)),
-        jaw_width: annotation.jaw_width,
-        outline: annotation.outline.as_ref().map(|outline| outline.transformed(&to_cut)),
-    };
-    Demonstration { image: imageops::crop_imm(image, left, top, width, height).to_image(), annotation }
 }
 
 /// The best score of the counted detections in a picture, in log-odds.
@@ -230,6 +201,7 @@ mod tests {
     use crate::teach::teach;
     use crate::teach::tests::demonstration;
     use burn::tensor::Device;
+    use sdg_geometry::PlanarSimilarity;
     use std::ops::ControlFlow;
 
     #[test]

@@ -1,6 +1,5 @@
 //! `sdg camera grab`.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -93,7 +92,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         }
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
         sdg_files::write_png(&path, &frame.picture)?;
-        print_frame(&path, &frame, args.json)?;
+        print_frame(&path, &frame, args.json);
         num_written += 1;
     }
     if num_written == 0 {
@@ -118,25 +117,22 @@ fn options(live: &LiveArgs, calibrated: Option<&CalibratedCamera>) -> Result<Ope
     Ok(options)
 }
 
-fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {
+fn print_frame(path: &Path, frame: &Frame, is_json: bool) {
     let unix_secs = frame.captured_unix_secs();
     let (width, height) = frame.picture.dimensions();
-    let mut stdout = std::io::stdout().lock();
     if is_json {
         let faults: Vec<_> = frame.faults.iter().map(|fault| fault.name()).collect();
         let told = json!({
             "file": path.display().to_string(), "camera": &*frame.camera, "number": frame.number, "captured_unix_secs": unix_secs,
             "width": width, "height": height, "faults": faults,
         });
-        writeln!(stdout, "{told}")?;
+        println!("{told}");
     } else {
         let faults: String = frame.faults.iter().map(|fault| format!("; {fault}")).collect();
         let number = frame.number;
-        writeln!(
-            stdout,
+        println!(
             "{}: frame {number}, {width} × {height} pixels, at {unix_secs:.3} s (Unix time){faults}",
             path.display()
-        )?;
+        );
     }
-    Ok(())
 }

@@ -15,7 +15,7 @@ use sdg_camera::{Address, Fault, Frame, MjpegServer};
 use sdg_cell::{
     DetectionWords, FrameDetector, FrameRecord, FrameSize, FrameSizes, Frames, Next, Part, Perception, drawing,
 };
-use sdg_grasp::{GraspDetection, TrackerConfig};
+use sdg_grasp::{GraspDetection, TrackerConfig, Verification};
 
 use super::args::DetectArgs;
 use crate::exit::{Outcome, Usage, one_line};
@@ -24,10 +24,9 @@ use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
 use crate::paint::{Paint, Tone};
-use crate::shared_args::verification;
 
 /// Reads frames until the camera ends, `--frames` are read or Ctrl-C is pressed.
-pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result<Outcome> {
+pub fn run(args: &DetectArgs, address: &Address, detector: Perception, verification: Verification) -> Result<Outcome> {
     let server = match &args.draw {
         None => None,
         Some(port) => {
@@ -42,10 +41,9 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         }
     };
     let mut frames = open(args, address, &detector)?;
-    let verification = verification(args.no_verify, detector.model());
     let mut tracking = TrackerConfig::DEFAULT;
     tracking.max_parts = args.max as usize;
-    let tracking = (!args.every_frame && !args.no_verify).then_some(tracking);
+    let tracking = (!args.every_frame && verification != Verification::Off).then_some(tracking);
     let mut finder = FrameDetector::new(detector, verification, tracking, address, frames.wait())?;
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
@@ -183,7 +181,7 @@ mod tests {
     use clap::Parser;
     use nalgebra::Vector2;
     use sdg_demonstration::Demonstration;
-    use sdg_grasp::{ModelKind, TeachOptions, TrackState, Verification, teach};
+    use sdg_grasp::{ModelKind, TeachOptions, TrackState, teach};
     use serde_json::Value;
 
     use super::*;

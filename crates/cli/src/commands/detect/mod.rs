@@ -4,7 +4,6 @@ mod args;
 mod inputs;
 mod live;
 
-use std::io::Write;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -19,6 +18,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_text::{FoundText, advice_with_options};
 use crate::json_line::json_line;
+use crate::output;
 use crate::paint::{Paint, Tone};
 use crate::shared_args::{RegionArg, verification};
 
@@ -31,14 +31,16 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.from.is_some() && !args.images.is_empty() {
         return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
     }
-    if args.from.is_some() && args.min_score != DEFAULT_MIN_SCORE && !args.every_frame && !args.no_verify {
+    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let verification = verification(args.no_verify, &model);
+    let is_tracked = args.from.is_some() && !args.every_frame && verification != Verification::Off;
+    if is_tracked && args.min_score != DEFAULT_MIN_SCORE {
         return Err(Usage(
             "--min-score: expected images, or live pictures with --every-frame, found live pictures with tracking"
                 .to_owned(),
         )
         .into());
     }
-    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if let Some(tolerance) = args.size_tolerance {
         model = model.with_size_tolerance(tolerance.range())?;
     }
@@ -56,14 +58,13 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         Some(RegionArg::Part(region)) => detector.look_in(Some(region)).context("--region")?,
     }
     if let Some(address) = &args.from {
-        return live::run(args, address, detector);
+        return live::run(args, address, detector, verification);
     }
     inputs::check_standard_input(&args.images)?;
     let mut batch = Batch {
         args,
         detector: &detector,
-        verification: verification(args.no_verify, detector.model()),
-        stdout: std::io::stdout().lock(),
+        verification,
         drawn: DrawnNames::of([]),
         num_used: 0,
         num_failed: 0,
@@ -104,11 +105,10 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
 }
 
 /// Processes pictures in order and prints the lines of each.
-struct Batch<'a, W> {
+struct Batch<'a> {
     args: &'a DetectArgs,
     detector: &'a Perception,
     verification: Verification,
-    stdout: W,
     /// File names of the drawings.
     drawn: DrawnNames,
     num_used: usize,
@@ -122,11 +122,11 @@ struct Batch<'a, W> {
     num_with_parts: usize,
 }
 
-impl<'a, W: Write> Batch<'a, W> {
+impl<'a> Batch<'a> {
     /// Detects parts in a picture and prints its lines. For a picture that cannot be used, reports the error.
     ///
     /// # Errors
-    /// Standard output cannot be written.
+    /// Standard output cannot be written, and there are no drawings, which are further results.
     fn picture(&mut self, input: &PictureInput) -> Result<()> {
         match self.detect(input) {
             Ok(seen) => {
@@ -135,10 +135,11 @@ impl<'a, W: Write> Batch<'a, W> {
                 let num_found = seen.listed(&text.words, false).len();
                 self.num_found += num_found;
                 self.num_with_parts += usize::from(num_found > 0);
-                write(&mut self.stdout, self.args, &seen, &text, &input.name())
+                print_lines(self.args, &seen, &text, &input.name())?;
             }
-            Err(error) => self.failed(&input.name(), &error),
+            Err(error) => self.failed(&input.name(), &error)?,
         }
+        if self.args.draw.is_none() { output::check() } else { Ok(()) }
     }
 
     /// Prints the totals of several pictures on standard error.
@@ -155,9 +156,8 @@ impl<'a, W: Write> Batch<'a, W> {
         let error = one_line(error);
         if self.args.json {
             let line = ErrorLine { image: name.to_owned(), error: error.clone() };
-            writeln!(self.stdout, "{}", json_line(&line)?)?;
+            println!("{}", json_line(&line)?);
         } else if !self.is_alone {
-            self.stdout.flush()?;
             eprintln!("{} {error}", Paint::stderr().text(Tone::Bad, "error:"));
         }
         self.last_error = error;
@@ -184,28 +184,22 @@ impl<'a, W: Write> Batch<'a, W> {
 }
 
 /// Prints the lines of a picture, or its JSON line.
-fn write(
-    out: &mut impl Write,
-    args: &DetectArgs,
-    seen: &SearchedPicture,
-    text: &FoundText<'_>,
-    name: &str,
-) -> Result<()> {
+fn print_lines(args: &DetectArgs, seen: &SearchedPicture, text: &FoundText<'_>, name: &str) -> Result<()> {
     let FoundText { words, .. } = text;
     let listed = seen.listed(words, args.all);
     let detections: Vec<&GraspDetection> = listed.iter().map(|found| &found.detection).collect();
     let touched = words.touched(&detections);
     if args.json {
-        writeln!(out, "{}", json_line(&seen.record(name, words, &listed, touched, advice_with_options))?)?;
+        println!("{}", json_line(&seen.record(name, words, &listed, touched, advice_with_options))?);
         return Ok(());
     }
     let refused = seen.refused(words);
     if refused.len() == seen.detections.len() {
-        writeln!(out, "{name}: {}", text.nothing(&refused, args.all))?;
+        println!("{name}: {}", text.nothing(&refused, args.all));
     }
     for (found, touched) in listed.iter().zip(touched) {
         let touched: Vec<&GraspDetection> = touched.into_iter().map(|idx| detections[idx]).collect();
-        writeln!(out, "{name}: {}", text.line(found, &touched))?;
+        println!("{name}: {}", text.line(found, &touched));
     }
     Ok(())
 }

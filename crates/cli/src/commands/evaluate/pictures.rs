@@ -29,11 +29,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     if let Some(label) = &labelled.foreign_label {
-        let object = model.object();
-        eprintln!(
-            "all labels are `{label}`, the model's part is `{object}`: they count as the part; --label {object} counts \
-             the pictures as without it"
-        );
+        eprintln!("{}", of_another_part(label, model.object()));
     }
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     sdg_files::prepare_folder(&report_folder)?;
@@ -59,6 +55,15 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     Ok(if found_nothing { Outcome::NothingToGrasp } else { Outcome::Done })
 }
 
+/// The message about labels that all have another name than the model's part.
+fn of_another_part(label: &str, object: &str) -> String {
+    format!(
+        "all labels are `{label}`, the model's part is `{object}`: they count as the part; --label {} counts the \
+         pictures as without it",
+        quoted(object)
+    )
+}
+
 /// The command that reproduces the results.
 fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
     let mut command = "sdg evaluate".to_owned();
@@ -74,4 +79,15 @@ fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
     }
     command += &ComputeArgs { device: args.device }.in_command();
     if args.no_verify { command + " --no-verify" } else { command }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_label_can_be_pasted_into_a_shell() {
+        let told = of_another_part("bolt", "my part");
+        assert!(told.contains("the model's part is `my part`") && told.contains("--label 'my part' counts"), "{told}");
+    }
 }
