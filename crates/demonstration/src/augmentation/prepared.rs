@@ -72,8 +72,8 @@ impl Prepared {
         });
         let kept = reduced.as_ref().unwrap_or(image);
         let (lanes, mut photo) = (LanePicture::from_image(kept), Raster::from_image(kept));
-        // One factor for both axes, that of the longer side: the rounding of the shorter side is then below half a pixel
-        // over the whole photo.
+        // One factor for both axes, that of the longer side: the rounding of the shorter side is then below half a
+        // pixel over the whole photo.
         let longer = usize::from(photo_size[1] > photo_size[0]);
         let prepared_from_photo = [photo.width, photo.height][longer] as f64 / photo_size[longer];
 
