@@ -121,8 +121,10 @@ impl PreparedSizes {
         range: &SizeRange,
         config: &SearchConfig,
     ) -> Result<Arc<Prepared>> {
-        // The scale of the resized cut-out in the halved picture.
-        let over_working = |scale: &f64| scale / working.shrink() / working.cutout_scale;
+        // The scale of the resized cut-out in the halved picture. A cut-out that is not resized although its size differs
+        // slightly, and rounding, may move an end of the range just beyond the bounds.
+        let (least, largest) = SearchConfig::SCALE_BOUNDS;
+        let over_working = |scale: &f64| (scale / working.shrink() / working.cutout_scale).clamp(least, largest);
         let scales = over_working(range.scales.start())..=over_working(range.scales.end());
         let key = PreparedKey { cutout_scale: working.cutout_scale, scales };
         let locked = || self.kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
