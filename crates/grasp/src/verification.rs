@@ -189,12 +189,12 @@ impl<'a> SizedDemonstration<'a> {
     /// The pose of the resized cut-out in the halved picture.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let view_from_image = scaling(1.0 / self.working.shrink());
-        view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
+        view_from_image.compose(image_from_cutout).compose(&self.prepared.working_from_cutout.inverse())
     }
 
     /// The pose of the cut-out in the image.
     fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
-        scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+        scaling(self.working.shrink()).compose(view_from_working).compose(&self.prepared.working_from_cutout)
     }
 
     /// Whether a match at an end of the size range agrees better beyond the range, and is therefore another part.
@@ -278,7 +278,7 @@ impl SizedDemonstration<'_> {
         }
         let search = &self.prepared.search;
         let coarsest_pixel = search.template().coarsest_pixel(view_from_working.scale);
-        let outline = self.demonstration.outline(&scaling(self.working.cutout_scale));
+        let outline = self.demonstration.outline(&self.prepared.working_from_cutout);
         let outline = outline.transformed(view_from_working);
         let Straightened { image, corner: [left, top] } =
             shift.straightened(&view.image, &outline, view_from_working, &marks, coarsest_pixel);
