@@ -108,8 +108,8 @@ pub(super) fn highest_scores(
 }
 
 /// The model with scores reduced until the pictures without the part (within the searched region) are refused, but only
-/// so far that nine in ten held-out samples of the part are still accepted. Pictures that would need more, because they may show the part, are
-/// returned and reduce nothing.
+/// so far that nine in ten held-out samples of the part are still accepted. Pictures that would need more, because they
+/// may show the part, are returned and reduce nothing.
 ///
 /// # Errors
 /// A picture that cannot be searched.
