@@ -51,6 +51,11 @@ impl Slant {
         Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
     }
 
+    /// The height of the camera above the table, in pixels of the level picture.
+    pub fn camera_height_px(&self) -> f64 {
+        self.focal_px * self.tilt_rad.cos()
+    }
+
     /// The foreshortening at a position of the picture. A short line of fixed length on the table has different lengths
     /// in the picture, depending on its direction. The result is the natural logarithm of the ratio of the longest to
     /// the shortest of these lengths, and the direction of the shortest in the picture. `None` as for
@@ -83,6 +88,7 @@ const MIN_DEPTH: f64 = 0.1;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     const SLANT: Slant = Slant { tilt_rad: 0.5, away: Angle::ZERO, focal_px: 700.0 };
 
@@ -93,6 +99,22 @@ mod tests {
             let level = Vector2::new(x, y);
             let back = slant.level_from_picture(slant.picture_from_level(level).unwrap()).unwrap();
             assert!((back - level).norm() < 1e-9, "{back}");
+        }
+    }
+
+    #[test]
+    fn a_raised_point_appears_away_from_the_point_below_the_camera() {
+        // The camera's axis and the axes of its picture, in directions away, aside and up, all in pixels of the level
+        // picture.
+        let (sin, cos) = SLANT.tilt_rad.sin_cos();
+        let (axis, away) = (Vector3::new(sin, 0.0, -cos), Vector3::new(cos, 0.0, sin));
+        let (foot, camera_height) = (SLANT.below_camera(), SLANT.camera_height_px());
+        for (level, height) in [(Vector2::new(120.0, -80.0), 15.0), (Vector2::new(-200.0, 60.0), 40.0)] {
+            let from_camera = Vector3::new(level.x - foot.x, level.y - foot.y, height - camera_height);
+            let seen = SLANT.focal_px / from_camera.dot(&axis) * Vector2::new(from_camera.dot(&away), from_camera.y);
+            let shift = SLANT.level_from_picture(seen).unwrap() - level;
+            let expected = height / (camera_height - height) * (level - foot.coords);
+            assert!((shift - expected).norm() < 1e-9, "{shift}");
         }
     }
 

@@ -7,6 +7,7 @@ use crate::lengths::Lengths;
 use crate::model::GraspModel;
 use crate::search_window::extents;
 use crate::taught::TaughtDemonstration;
+use crate::taught_marks::whole_size;
 
 impl GraspModel {
     /// The model for calibrated cameras, as if its photos had been taken vertically from above at a large distance.
@@ -38,11 +39,10 @@ impl GraspModel {
 fn resized(demonstration: TaughtDemonstration, factor: f64) -> Result<TaughtDemonstration> {
     let check = demonstration.check().clone();
     let TaughtDemonstration { cutout, marks, .. } = demonstration;
-    let side = |length: u32| ((f64::from(length) * factor).round() as u32).max(1);
-    // Marks are scaled by the ratio of the whole numbers of pixels.
-    let factor = f64::from(side(cutout.width())) / f64::from(cutout.width());
-    let marks = marks.resized(factor);
-    let cutout = imageops::resize(&cutout, side(cutout.width()), side(cutout.height()), FilterType::Triangle);
+    let own = [cutout.width(), cutout.height()];
+    let [width, height] = whole_size(own, factor);
+    let marks = marks.resized(own, [width, height]);
+    let cutout = imageops::resize(&cutout, width, height, FilterType::Triangle);
     TaughtDemonstration::with_config(cutout, marks, check)
 }
 

@@ -12,13 +12,14 @@ use std::sync::{Arc, Mutex};
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};
+use sdg_geometry::PlanarSimilarity;
 use sdg_shape::{SearchConfig, ShapeSearch};
 
 use crate::error::Result;
 use crate::marks_shift::MarksShift;
 use crate::round_top::RoundTop;
 use crate::sizes::SizeRange;
-use crate::taught_marks::TaughtMarks;
+use crate::taught_marks::{TaughtMarks, whole_size};
 
 /// Maximum extent of a part at the working resolution, in pixels. Chosen to save time: the resulting error is at most a
 /// fraction of a pixel.
@@ -35,8 +36,8 @@ const MAX_KEPT: usize = 4;
 pub(crate) struct WorkingSize {
     /// Number of times the picture is halved.
     pub(crate) halvings: u32,
-    /// Resizing factor of the cut-out.
-    pub(crate) cutout_scale: f64,
+    /// Resizing factor of the cut-out, before its sides are rounded to whole pixels.
+    cutout_scale: f64,
 }
 
 impl WorkingSize {
@@ -64,6 +65,8 @@ impl WorkingSize {
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) search: ShapeSearch,
+    /// The similarity nearest to the resizing of the cut-out.
+    pub(crate) working_from_cutout: PlanarSimilarity,
     /// The position of the marks; `None` if there are too few edges around them, and for a part of revolution.
     pub(crate) marks_shift: Option<MarksShift>,
     /// The position of the marks of a part of revolution; `None` for other parts.
@@ -71,20 +74,17 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    fn new(cutout: &RgbImage, marks: &TaughtMarks, cutout_scale: f64, config: &SearchConfig) -> Result<Self> {
-        let resized;
-        let (cutout, marks) = if cutout_scale == 1.0 {
-            (cutout, marks.clone())
-        } else {
-            let [width, height] =
-                [cutout.width(), cutout.height()].map(|side| ((f64::from(side) * cutout_scale).round() as u32).max(1));
-            resized = imageops::resize(cutout, width, height, FilterType::Triangle);
-            (&resized, marks.resized(cutout_scale))
-        };
+    /// `cutout` and `marks` are resized.
+    fn new(
+        cutout: &RgbImage,
+        marks: &TaughtMarks,
+        working_from_cutout: PlanarSimilarity,
+        config: &SearchConfig,
+    ) -> Result<Self> {
         let search = ShapeSearch::new(cutout, &marks.region(), config)?;
-        let round_top = search.revolution().map(|revolution| RoundTop::new(revolution, &marks));
-        let marks_shift = if round_top.is_some() { None } else { MarksShift::new(cutout, &marks, &config.shape) };
-        Ok(Self { search, marks_shift, round_top })
+        let round_top = search.revolution().map(|revolution| RoundTop::new(revolution, marks));
+        let marks_shift = if round_top.is_some() { None } else { MarksShift::new(cutout, marks, &config.shape) };
+        Ok(Self { search, working_from_cutout, marks_shift, round_top })
     }
 }
 
@@ -103,7 +103,8 @@ struct Kept {
 
 #[derive(Debug, Clone, PartialEq)]
 struct PreparedKey {
-    cutout_scale: f64,
+    /// Width and height of the resized cut-out.
+    size: [u32; 2],
     /// The range of sizes, relative to the working size.
     scales: std::ops::RangeInclusive<f64>,
 }
@@ -121,17 +122,31 @@ impl PreparedSizes {
         range: &SizeRange,
         config: &SearchConfig,
     ) -> Result<Arc<Prepared>> {
-        // The scale of the resized cut-out in the halved picture.
-        let over_working = |scale: &f64| scale / working.shrink() / working.cutout_scale;
+        let own = [cutout.width(), cutout.height()];
+        let size = whole_size(own, working.cutout_scale);
+        let resized_marks = marks.resized(own, size);
+        let working_from_cutout =
+            if size == own { PlanarSimilarity::IDENTITY } else { nearest_similarity(marks, &resized_marks) };
+        // The scale of the resized cut-out in the halved picture. An end of the range may lie just beyond the bounds:
+        // because of rounding, or because the cut-out is not resized although its size differs slightly.
+        let (least, largest) = SearchConfig::SCALE_BOUNDS;
+        let over_working = |scale: &f64| (scale / working.shrink() / working_from_cutout.scale).clamp(least, largest);
         let scales = over_working(range.scales.start())..=over_working(range.scales.end());
-        let key = PreparedKey { cutout_scale: working.cutout_scale, scales };
+        let key = PreparedKey { size, scales };
         let locked = || self.kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(kept) = locked().iter().find(|kept| kept.key == key) {
             return Ok(kept.prepared.clone());
         }
         let mut config = config.clone();
         config.scales = key.scales.clone();
-        let made = Arc::new(Prepared::new(cutout, marks, working.cutout_scale, &config)?);
+        let resized;
+        let cutout = if size == own {
+            cutout
+        } else {
+            resized = imageops::resize(cutout, size[0], size[1], FilterType::Triangle);
+            &resized
+        };
+        let made = Arc::new(Prepared::new(cutout, &resized_marks, working_from_cutout, &config)?);
         let mut kept = locked();
         if kept.len() == MAX_KEPT {
             kept.remove(0);
@@ -141,9 +156,53 @@ impl PreparedSizes {
     }
 }
 
+/// The similarity nearest to the resizing of a cut-out with these marks. Poses are similarities, but the two axes have
+/// slightly different factors, because each side is rounded to whole pixels.
+fn nearest_similarity(marks: &TaughtMarks, resized: &TaughtMarks) -> PlanarSimilarity {
+    let [from, to] = [marks, resized].map(|marks| marks.region().vertices);
+    // Only an outline without extent has none; it is refused as a part without a shape to compare.
+    PlanarSimilarity::fit(&from, &to).unwrap_or(PlanarSimilarity::IDENTITY)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::Rgb;
+    use nalgebra::{Point2, Vector2};
+    use sdg_geometry::{BoundingBox, GraspLine};
+
+    #[test]
+    fn marks_of_a_resized_cut_out_stay_on_their_pixels() {
+        let dot = Point2::new(50.0, 30.0);
+        let cutout = RgbImage::from_fn(61, 43, |x, y| {
+            let away = Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) - dot;
+            Rgb([(255.0 * (-away.norm_squared() / 18.0).exp()).round() as u8; 3])
+        });
+        let marks = TaughtMarks {
+            label: "dot".to_owned(),
+            bbox: BoundingBox { x1: 8.0, y1: 8.0, x2: 53.0, y2: 35.0 },
+            grasp: GraspLine::new(dot, Point2::new(20.0, 20.0)),
+            outline: None,
+            width_px: 10.0,
+            photo_size: None,
+            photo_middle: None,
+        };
+        // 50.63 × 35.69 pixels, rounded.
+        let size = whole_size([61, 43], 0.83);
+        assert_eq!(size, [51, 36]);
+        let resized = imageops::resize(&cutout, size[0], size[1], FilterType::Triangle);
+        let (mut sum, mut weight) = (Vector2::<f64>::zeros(), 0.0);
+        for (x, y, pixel) in resized.enumerate_pixels() {
+            sum += f64::from(pixel[0]) * Vector2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            weight += f64::from(pixel[0]);
+        }
+        let seen = Point2::from(sum / weight);
+        let resized_marks = marks.resized([61, 43], size);
+        let by_pose = nearest_similarity(&marks, &resized_marks).apply(&dot);
+        for mark in [resized_marks.grasp.start, by_pose] {
+            assert!((mark - seen).norm() < 0.1, "{mark} instead of {seen}");
+        }
+    }
 
     #[test]
     fn large_parts_are_halved_and_small_ones_stay() {

@@ -31,10 +31,15 @@ impl RoundTop {
     /// The shift of the marks relative to the outline in the camera's picture.
     ///
     /// # Units and frames
-    /// Pixels of the picture, also for the focal length; `below_camera` is the point of the table vertically below the
-    /// camera.
-    fn shift(&self, focal_px: f64, below_camera: Point2<f64>, image_from_cutout: &PlanarSimilarity) -> Vector2<f64> {
-        let nearer = self.rise * image_from_cutout.scale / focal_px;
+    /// Pixels of the picture, also for the camera's height above the table; `below_camera` is the point of the table
+    /// vertically below the camera.
+    fn shift(
+        &self,
+        camera_height_px: f64,
+        below_camera: Point2<f64>,
+        image_from_cutout: &PlanarSimilarity,
+    ) -> Vector2<f64> {
+        let nearer = self.rise * image_from_cutout.scale / camera_height_px;
         nearer * (image_from_cutout.apply(&self.photo_middle) - below_camera)
     }
 
@@ -47,10 +52,10 @@ impl RoundTop {
         &self,
         search: &ShapeSearch,
         field: &GradientField,
-        (focal_px, below_camera): (f64, Point2<f64>),
+        (camera_height_px, below_camera): (f64, Point2<f64>),
         image_from_cutout: &PlanarSimilarity,
     ) -> PlanarSimilarity {
-        let shift = self.shift(focal_px, below_camera, image_from_cutout);
+        let shift = self.shift(camera_height_px, below_camera, image_from_cutout);
         let outline = search.outline_beside(field, image_from_cutout, -shift);
         image_from_cutout.shifted((1.0 - outline) * shift)
     }

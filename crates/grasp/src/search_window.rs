@@ -113,10 +113,7 @@ impl SearchWindow {
     pub(crate) fn shot(&self) -> Shot {
         let middle = |whole: u32, from: u32| 0.5 * f64::from(whole) - f64::from(from);
         let [width, height] = self.whole;
-        Shot {
-            size: self.whole,
-            below_camera: Point2::new(middle(width, self.rect.left), middle(height, self.rect.top)),
-        }
+        Shot::level_at(self.whole, Point2::new(middle(width, self.rect.left), middle(height, self.rect.top)))
     }
 
     /// Maps pixels of the window to those of the whole image.

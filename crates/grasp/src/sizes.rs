@@ -159,6 +159,18 @@ mod tests {
 
     #[cfg(feature = "teach")]
     #[test]
+    fn the_widest_tolerance_is_searched_at_every_nominal_size() {
+        let model = drawn_part::model([320, 240]).with_size_tolerance(0.5..=2.0).unwrap();
+        // Nearly twice the photo's pixels per side: the cut-out is not resized for the picture halved once.
+        let pose = scaling(2.5).compose(&drawn_part::at(127.0, 95.0, 20.0));
+        let found = model.detect(&drawn_part::picture([636, 477], &[pose]), Verification::ByShape).unwrap();
+        let center = drawn_part::line().transformed(&pose).center();
+        let is_part = |found: &GraspDetection| found.is_accepted() && (found.grasp.center() - center).norm() < 3.0;
+        assert!(found.iter().any(is_part), "{center}: {found:?}");
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
     fn parts_of_one_picture_have_one_size_in_pixels() {
         // A picture of five sixths of the photo's pixels per side, searched once for both nominal sizes. The two sizes
         // differ by 4 % and are next to different nominal sizes.

@@ -259,7 +259,11 @@ impl LevelImage {
     }
 
     pub(crate) fn shot(&self) -> Shot {
-        Shot { size: self.taken.size, below_camera: self.slant.below_camera() + self.middle }
+        Shot {
+            size: self.taken.size,
+            below_camera: self.slant.below_camera() + self.middle,
+            camera_height_px: self.slant.camera_height_px(),
+        }
     }
 
     fn point(&self, level: &Point2<f64>) -> Option<Point2<f64>> {
@@ -378,6 +382,15 @@ mod tests {
         assert!(sum / (160.0 * 160.0) < 4.0, "{}", sum / (160.0 * 160.0));
         let point = Point2::new(210.0, 150.0);
         assert!((made.point(&made.level_point(&point).unwrap()).unwrap() - point).norm() < 1e-9);
+    }
+
+    #[test]
+    fn the_camera_of_a_level_image_is_as_high_as_its_lens_and_slant_tell() {
+        let slant = Slant { focal_px: 300.0, ..slant(60.0) };
+        let image = RgbImage::new(SIZE[0], SIZE[1]);
+        let window = [Point2::new(230.0, 170.0), Point2::new(250.0, 190.0)];
+        let made = LevelImage::about(&image, &Shot::level(&image), &slant, &window).unwrap();
+        assert!((made.shot().camera_height_px - 150.0).abs() < 1e-9, "{:?}", made.shot());
     }
 
     #[cfg(feature = "teach")]

@@ -1,9 +1,8 @@
 //! The marks of a demonstration as stored in a model.
 
+use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use serde::{Deserialize, Serialize};
-
-use crate::sizes::scaling;
 
 /// The marks, in pixels of the stored cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,24 +36,30 @@ pub(crate) fn extent(bbox: &BoundingBox, grasp: &GraspLine) -> BoundingBox {
     }
 }
 
+/// Width and height resized by `factor`, in whole pixels.
+pub(crate) fn whole_size(size: [u32; 2], factor: f64) -> [u32; 2] {
+    size.map(|side| ((f64::from(side) * factor).round() as u32).max(1))
+}
+
 impl TaughtMarks {
     /// The outline; the box if none was drawn.
     pub fn region(&self) -> Polygon {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
     }
 
-    /// The marks on the cut-out resized by `factor`.
-    pub(crate) fn resized(&self, factor: f64) -> Self {
-        let resize = scaling(factor);
+    /// The marks on the cut-out of width and height `from` resized to `to`: each axis is scaled like the pixels.
+    pub(crate) fn resized(&self, from: [u32; 2], to: [u32; 2]) -> Self {
+        let [across, down] = [0, 1].map(|axis| f64::from(to[axis]) / f64::from(from[axis]));
+        let resize = |point: &Point2<f64>| Point2::new(across * point.x, down * point.y);
         let BoundingBox { x1, y1, x2, y2 } = self.bbox;
         Self {
             label: self.label.clone(),
-            bbox: BoundingBox { x1: factor * x1, y1: factor * y1, x2: factor * x2, y2: factor * y2 },
-            grasp: self.grasp.transformed(&resize),
-            outline: self.outline.as_ref().map(|outline| outline.transformed(&resize)),
-            width_px: factor * self.width_px,
+            bbox: BoundingBox { x1: across * x1, y1: down * y1, x2: across * x2, y2: down * y2 },
+            grasp: GraspLine::new(resize(&self.grasp.start), resize(&self.grasp.end)),
+            outline: self.outline.as_ref().map(|outline| outline.scaled(across, down)),
+            width_px: (across * down).sqrt() * self.width_px,
             photo_size: None,
-            photo_middle: self.photo_middle.map(|middle| middle.map(|at| factor * at)),
+            photo_middle: self.photo_middle.map(|[x, y]| [across * x, down * y]),
         }
     }
 }

@@ -36,6 +36,8 @@ pub(crate) struct Shot {
     pub(crate) size: [u32; 2],
     /// The point of the table vertically below the camera, in pixels of the image.
     pub(crate) below_camera: Point2<f64>,
+    /// The height of the camera above the table, in pixels of the image.
+    pub(crate) camera_height_px: f64,
 }
 
 /// Assumed focal length of a camera, in lengths of the picture's longer side: a field of view of 49°. Chosen by hand.
@@ -47,11 +49,16 @@ pub(crate) fn usual_focal_px(size: [u32; 2]) -> f64 {
 }
 
 impl Shot {
+    /// The shot of a camera with the usual lens that points vertically down at a point of the image.
+    pub(crate) fn level_at(size: [u32; 2], below_camera: Point2<f64>) -> Self {
+        Self { size, below_camera, camera_height_px: usual_focal_px(size) }
+    }
+
     /// The shot of a camera that points vertically down.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn level(image: &RgbImage) -> Self {
         let (width, height) = image.dimensions();
-        Self { size: [width, height], below_camera: Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)) }
+        Self::level_at([width, height], Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)))
     }
 }
 
@@ -59,7 +66,7 @@ impl Shot {
 struct View<'a> {
     halvings: u32,
     below_camera: Point2<f64>,
-    focal_px: f64,
+    camera_height_px: f64,
     image: Cow<'a, RgbImage>,
     field: GradientField,
     table: TableColors,
@@ -136,8 +143,8 @@ impl<'a> SearchedImage<'a> {
         let config = &demonstration.check().search.shape.gradient;
         let (field, table) = parallel::join(|| GradientField::with_config(&view, config), || TableColors::new(&view));
         let pixel_size = f64::from(1u32 << halvings);
-        let (below_camera, focal_px) = (shot.below_camera / pixel_size, usual_focal_px(shot.size) / pixel_size);
-        self.views.push(View { halvings, below_camera, focal_px, image: view, field, table });
+        let (below_camera, camera_height_px) = (shot.below_camera / pixel_size, shot.camera_height_px / pixel_size);
+        self.views.push(View { halvings, below_camera, camera_height_px, image: view, field, table });
         self.views.len() - 1
     }
 }
@@ -182,12 +189,12 @@ impl<'a> SizedDemonstration<'a> {
     /// The pose of the resized cut-out in the halved picture.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let view_from_image = scaling(1.0 / self.working.shrink());
-        view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
+        view_from_image.compose(image_from_cutout).compose(&self.prepared.working_from_cutout.inverse())
     }
 
     /// The pose of the cut-out in the image.
     fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
-        scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+        scaling(self.working.shrink()).compose(view_from_working).compose(&self.prepared.working_from_cutout)
     }
 
     /// Whether a match at an end of the size range agrees better beyond the range, and is therefore another part.
@@ -232,7 +239,7 @@ impl<'a> SizedDemonstration<'a> {
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
         let round_top = self.prepared.round_top.as_ref().filter(|_| !is_flat);
-        let camera = (view.focal_px, view.below_camera);
+        let camera = (view.camera_height_px, view.below_camera);
         let (marks, agreement, evidence) = if let Some(top) = round_top {
             let marks = top.placed(&self.prepared.search, &view.field, camera, view_from_working);
             (marks, agreement, evidence)
@@ -271,7 +278,7 @@ impl SizedDemonstration<'_> {
         }
         let search = &self.prepared.search;
         let coarsest_pixel = search.template().coarsest_pixel(view_from_working.scale);
-        let outline = self.demonstration.outline(&scaling(self.working.cutout_scale));
+        let outline = self.demonstration.outline(&self.prepared.working_from_cutout);
         let outline = outline.transformed(view_from_working);
         let Straightened { image, corner: [left, top] } =
             shift.straightened(&view.image, &outline, view_from_working, &marks, coarsest_pixel);

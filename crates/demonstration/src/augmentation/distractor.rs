@@ -2,12 +2,17 @@
 
 use nalgebra::{Point2, Rotation2, Vector2};
 
+use super::distance::BAND_PX;
 use super::figure::Figure;
 use super::mutant::Mutant;
 use super::noise::NoiseTile;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, uniform};
 use crate::raster::{PixelRect, Raster, blend, smoothstep};
+
+/// Width of the widest frame in which the shadows of cut-outs keep the drawn softness, in pixels: the samples of usual
+/// photos, on which the networks were measured, stay the same.
+const MAX_USUAL_WIDTH: usize = 1100;
 
 /// The direction of a scene's light and the softness of its shadows.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +39,13 @@ impl Lamp {
             shadow_shift_px: uniform(rng, 1.0, 9.0) * output_scale,
             shadow_softness_px: uniform(rng, 1.0, 7.0) * output_scale,
         }
+    }
+
+    /// The softness of a cut-out's shadow, whose distances from the outline are known up to `band_px`: a softer shadow
+    /// does not end within the band, so that it would darken a rectangle around the cut-out.
+    pub fn cut_out_softness_px(&self, band_px: f32, frame_width: usize) -> f32 {
+        let limit = if frame_width > MAX_USUAL_WIDTH { band_px } else { f32::INFINITY };
+        self.shadow_softness_px.min(limit)
     }
 }
 
@@ -198,7 +210,8 @@ pub(crate) fn paint_mutant(
     let reach = mutant.radius * scale;
     let bounds = [center[0] - reach, center[1] - reach, center[0] + reach, center[1] + reach];
     if lamp.shadow > 0.0 {
-        let (shift, soft) = (lamp.shadow_shift_px, lamp.shadow_softness_px);
+        let shift = lamp.shadow_shift_px;
+        let soft = lamp.cut_out_softness_px(BAND_PX / prepared * scale, canvas.frame_width);
         let rect = PixelRect::covering(bounds, shift + soft, canvas.width, canvas.height);
         for y in rect.y1..rect.y2 {
             for x in rect.x1..rect.x2 {

@@ -34,6 +34,8 @@ pub(crate) struct Prepared {
     /// The outline, or the box.
     pub region: Polygon,
     pub has_outline: bool,
+    /// Whether the region reaches the outermost pixels of the prepared photo.
+    touches_border: bool,
     /// The box, in photo pixels.
     pub drawn_box: BoundingBox,
     /// The centre of the region.
@@ -70,12 +72,17 @@ impl Prepared {
         });
         let kept = reduced.as_ref().unwrap_or(image);
         let (lanes, mut photo) = (LanePicture::from_image(kept), Raster::from_image(kept));
-        // One factor for both axes; the rounding of the shorter side is below half a pixel over the whole photo.
-        let prepared_from_photo = photo.width as f64 / photo_size[0];
+        // One factor for both axes, that of the longer side: the rounding of the shorter side is then below half a
+        // pixel over the whole photo.
+        let longer = usize::from(photo_size[1] > photo_size[0]);
+        let prepared_from_photo = [photo.width, photo.height][longer] as f64 / photo_size[longer];
 
         let annotation = &demonstration.annotation;
         let region = annotation.region();
         let prepared_region = region.scaled(prepared_from_photo, prepared_from_photo);
+        let bounds = prepared_region.bounds();
+        let [right, bottom] = [photo.width, photo.height].map(|side| side as f64 - 1.0);
+        let touches_border = bounds.x1 < 1.0 || bounds.y1 < 1.0 || bounds.x2 > right || bounds.y2 > bottom;
         let distance = signed_distance(&prepared_region, photo.width, photo.height);
         for (pixel, &distance) in photo.pixels.iter_mut().zip(&distance) {
             pixel[3] = distance;
@@ -108,6 +115,7 @@ impl Prepared {
             background,
             region,
             has_outline: annotation.outline.is_some(),
+            touches_border,
             drawn_box: annotation.bbox,
             center,
             radius,
@@ -116,6 +124,17 @@ impl Prepared {
             colors,
             mutants: Vec::new(),
         }
+    }
+
+    /// The distance to the outline at a prepared pixel, positive inside, from that of the nearest pixel of the photo: a
+    /// part at the photo's border ends there, instead of continuing with the border's pixels.
+    #[inline(always)]
+    pub fn ended_at_border(&self, distance: f32, u: f32, v: f32) -> f32 {
+        if !self.touches_border {
+            return distance;
+        }
+        let from_border = u.min(self.photo.width as f32 - u).min(v).min(self.photo.height as f32 - v);
+        distance.min(from_border)
     }
 
     /// The map from output pixels to prepared pixels, for the warp of the rasters.
@@ -156,7 +175,35 @@ fn spread(region: &Polygon) -> Vec<Point2<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use image::{Rgb, RgbImage};
+
+    use super::super::random::{Stream, sample_rng};
     use super::*;
+    use crate::Annotation;
+
+    #[test]
+    fn marks_at_the_bottom_of_a_tall_photo_stay_on_their_pixels() {
+        // A white square about (150, 2900).
+        let dot = Point2::new(150.0, 2900.0);
+        let is_dot = |x: u32, y: u32| (130..170).contains(&x) && (2880..2920).contains(&y);
+        let image = RgbImage::from_fn(300, 3000, |x, y| Rgb([if is_dot(x, y) { 255 } else { 0 }; 3]));
+        let bbox = BoundingBox { x1: 60.0, y1: 2700.0, x2: 240.0, y2: 2960.0 };
+        let outline = Some(Polygon::from_box(&bbox));
+        let annotation = Annotation { label: "part".into(), bbox, grasp: None, jaw_width: None, outline };
+        let mut rng = sample_rng(1, Stream::Preparation, 0);
+        // 31.4 × 313.75 pixels, rounded to 31 × 314.
+        let part = Prepared::without_mutants(&Demonstration { image, annotation }, [100, 251], &mut rng);
+        let width = part.photo.width;
+        assert_eq!((width, part.photo.height), (31, 314));
+        let (mut sum, mut weight) = (nalgebra::Vector2::<f64>::zeros(), 0.0);
+        for (at, pixel) in part.photo.pixels.iter().enumerate() {
+            let red = f64::from(pixel[0]);
+            sum += red * nalgebra::Vector2::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
+            weight += red;
+        }
+        let seen = Point2::from(sum / weight);
+        assert!((seen - dot * part.prepared_from_photo).norm() < 0.5, "{seen}");
+    }
 
     #[test]
     fn points_are_spread_over_a_thin_sliver_too() {

@@ -6,6 +6,7 @@ use sdg_geometry::Visibility;
 
 use super::background::{NoiseBank, paint_photo, paint_surfaces};
 use super::config::SceneStyle;
+use super::distance::BAND_PX;
 use super::distractor::{Distractor, Lamp, paint_mutant};
 use super::figure::Figure;
 use super::homography::Homography;
@@ -126,7 +127,8 @@ impl Studio<'_> {
         // Distances in the raster are in prepared pixels; edges and shadows are defined in canvas pixels.
         let canvas_from_prepared = (scale_at(pose, &part.center) / part.prepared_from_photo) as f32;
         if !own_table && lamp.shadow > 0.0 {
-            let (shift, soft) = (lamp.shadow_shift_px, lamp.shadow_softness_px);
+            let shift = lamp.shadow_shift_px;
+            let soft = lamp.cut_out_softness_px(BAND_PX * canvas_from_prepared, canvas.frame_width);
             let moved = Homography::new(Matrix3::new_translation(&nalgebra::Vector2::new(
                 f64::from(shift * lamp.towards[0]),
                 f64::from(shift * lamp.towards[1]),
@@ -137,7 +139,7 @@ impl Studio<'_> {
                 let row = source.row(y);
                 for x in rect.x1..rect.x2 {
                     let (u, v) = row.at(x);
-                    let inside = part.photo.nearest(u, v)[3] * canvas_from_prepared;
+                    let inside = part.ended_at_border(part.photo.nearest(u, v)[3], u, v) * canvas_from_prepared;
                     let dark = lamp.shadow * smoothstep(-soft, soft, inside);
                     blend(&mut canvas.pixels[y * canvas.width + x], [0.0; 3], dark);
                 }
@@ -153,7 +155,8 @@ impl Studio<'_> {
             for x in rect.x1..rect.x2 {
                 let (u, v) = row.at(x);
                 let pixel = part.photo.bilinear(u, v);
-                let alpha = smoothstep(edge - feather, edge + feather, pixel[3] * canvas_from_prepared);
+                let inside = part.ended_at_border(pixel[3], u, v) * canvas_from_prepared;
+                let alpha = smoothstep(edge - feather, edge + feather, inside);
                 if alpha > 0.0 {
                     let color = std::array::from_fn(|k| pixel[k] * gain[k] * level);
                     blend(&mut canvas.pixels[y * canvas.width + x], color, alpha);
@@ -214,4 +217,85 @@ fn scale_at(pose: &Homography, place: &Point2<f64>) -> f64 {
     let right = pose.apply(&Point2::new(place.x + 1.0, place.y)) - here;
     let below = pose.apply(&Point2::new(place.x, place.y + 1.0)) - here;
     right.perp(&below).abs().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
+
+    use super::super::random::{Stream, sample_rng};
+    use super::*;
+    use crate::{Annotation, Demonstration};
+
+    /// The part with these corners in a white photo of 300 × 300 pixels, prepared in the photo's resolution.
+    fn part(corners: [(f64, f64); 4]) -> Prepared {
+        let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };
+        let annotation = Annotation {
+            label: "part".into(),
+            bbox: outline.bounds(),
+            grasp: None,
+            jaw_width: None,
+            outline: Some(outline),
+        };
+        let image = RgbImage::from_pixel(300, 300, image::Rgb([255; 3]));
+        let mut rng = sample_rng(1, Stream::Preparation, 0);
+        Prepared::without_mutants(&Demonstration { image, annotation }, [300, 300], &mut rng)
+    }
+
+    /// A light whose shadows have this softness and strength, and lie below their parts.
+    fn lamp(shadow: f32, shadow_softness_px: f32) -> Lamp {
+        Lamp { towards: [1.0, 0.0], elevation: 0.7, shadow, shadow_shift_px: 0.0, shadow_softness_px }
+    }
+
+    /// Paints the part on another table than its own.
+    fn paint(canvas: &mut Raster, part: &Prepared, pose: &Homography, lamp: &Lamp, seed: u64) {
+        let mut rng = sample_rng(seed, Stream::Training, 0);
+        let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));
+        let size = [canvas.width as u32, canvas.height as u32];
+        let style = SceneStyle::default();
+        let studio =
+            Studio { parts: &[], others: &[], style: &style, noises: &noises, normal: &normal, size, frame: size };
+        studio.paint_part(canvas, part, pose, false, lamp, &mut rng);
+    }
+
+    #[test]
+    fn the_shadow_of_a_cut_out_ends_in_a_wide_frame() {
+        let diamond = part([(150.0, 90.0), (210.0, 150.0), (150.0, 210.0), (90.0, 150.0)]);
+        let lamp = lamp(0.7, 88.0);
+        let mut table = Raster::filled(300, 300, [0.5; 4]);
+        table.frame_width = 4032;
+        let (mut with_part, mut with_mutant) = (table.clone(), table);
+        paint(&mut with_part, &diamond, &Homography::scaling(1.0), &lamp, 1);
+        let whole = Mutant::whole(diamond.radius as f32);
+        let mut rng = sample_rng(1, Stream::Training, 0);
+        paint_mutant(&mut with_mutant, &diamond, &whole, [150.0; 2], 1.0, &lamp, &mut rng);
+        for canvas in [with_part, with_mutant] {
+            let red = |x: usize, y: usize| canvas.pixels[y * 300 + x][0];
+            // 3 to 20 px from the diamond at any angle, and more than 50 px from it.
+            assert!(red(212, 150) < 0.5, "{}", red(212, 150));
+            assert_eq!(red(70, 70), 0.5);
+        }
+        assert_eq!(lamp.cut_out_softness_px(24.0, 1100), 88.0);
+    }
+
+    #[test]
+    fn a_part_at_the_border_of_its_photo_ends_there() {
+        let half = part([(0.0, 0.0), (150.0, 0.0), (150.0, 300.0), (0.0, 300.0)]);
+        let middle = Point2::new(250.0, 250.0);
+        let turned = PlanarSimilarity::about(half.center, middle, Angle::from_degrees(30.0), 1.0);
+        let pose = Homography::from_similarity(&turned);
+        let outline = SampleObject::new(&half, &pose, [500; 2], 0).outline.unwrap();
+        // The soft edges of part and shadow reach 1.9 px and 5 px, at a corner √2 times as far.
+        for (shadow, reach) in [(0.0, 3.0), (0.7, 8.0)] {
+            for seed in 0..4 {
+                let mut canvas = Raster::filled(500, 500, [0.5; 4]);
+                paint(&mut canvas, &half, &pose, &lamp(shadow, 5.0), seed);
+                for (at, pixel) in canvas.pixels.iter().enumerate() {
+                    let point = Point2::new((at % 500) as f64 + 0.5, (at / 500) as f64 + 0.5);
+                    let is_near = || outline.contains(&point) || outline.distance_to_edge(&point) < reach;
+                    assert!((pixel[0] - 0.5).abs() < 0.002 || is_near(), "seed {seed}: {pixel:?} at {point}");
+                }
+            }
+        }
+    }
 }

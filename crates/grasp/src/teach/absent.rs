@@ -18,7 +18,7 @@ use sdg_geometry::{BoundingBox, percentile};
 
 use super::options::TeachOptions;
 use crate::decimal::decimal;
-use crate::error::Result;
+use crate::error::{GraspError, Result};
 use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
@@ -106,9 +106,9 @@ pub(super) fn highest_scores(
     pictures.iter().map(highest).collect()
 }
 
-/// The model with scores reduced until the pictures without the part are refused, but only so far that nine in ten
-/// held-out samples of the part are still accepted. Pictures that would need more, because they may show the part, are
-/// returned and reduce nothing.
+/// The model with scores reduced until the pictures without the part (within the searched region) are refused, but only
+/// so far that nine in ten held-out samples of the part are still accepted. Pictures that would need more, because they
+/// may show the part, are returned and reduce nothing.
 ///
 /// # Errors
 /// A picture that cannot be searched.
@@ -119,11 +119,14 @@ pub(super) fn calibrated(
 ) -> Result<(GraspModel, Vec<AcceptedNegative>)> {
     // Pictures of a model with known lengths are plan views.
     let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
-    let absent = options
-        .negatives
-        .iter()
-        .map(|picture| best_log_odds(&as_used, picture, |_| true))
-        .collect::<Result<Vec<Option<f64>>>>()?;
+    // The region is in pixels of the camera's pictures: plan views count whole.
+    let in_region = as_used.clone().with_region(options.region.filter(|_| options.lengths.is_none()))?;
+    let best = |picture: &RgbImage| match best_log_odds(&in_region, picture, |_| true) {
+        // A picture that the region does not fit, such as one of another size, also counts whole.
+        Err(GraspError::Region(_)) => best_log_odds(&as_used, picture, |_| true),
+        best => best,
+    };
+    let absent = options.negatives.iter().map(best).collect::<Result<Vec<Option<f64>>>>()?;
     let scores: Vec<f64> = absent.iter().flatten().copied().collect();
     let log_odds = if scores.iter().any(|score| score + MARGIN > 0.0) {
         less_for(&scores, &on_parts(&as_used, demonstrations, options)?)
@@ -196,8 +199,10 @@ fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&Boundi
 mod tests {
     use super::*;
     use crate::check_config::CheckConfig;
+    use crate::drawn_part;
     use crate::facts::ModelKind;
     use crate::lengths::Lengths;
+    use crate::region::SearchRegion;
     use crate::teach::teach;
     use crate::teach::tests::demonstration;
     use burn::tensor::Device;
@@ -299,6 +304,27 @@ mod tests {
         let facts = after.model.facts().negatives.unwrap();
         assert_eq!(facts, NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 });
         assert!(after.accepted_negatives.is_empty());
+    }
+
+    #[test]
+    fn only_the_searched_region_of_a_picture_counts() {
+        const SIZE: [u32; 2] = [480, 360];
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        options.region = Some(SearchRegion::new([0, 0, 250, 200]).of_picture(SIZE));
+        let teach_s = |options: &TeachOptions| {
+            teach(&[drawn_part::demonstration(SIZE)], options, &mut |_| ControlFlow::Continue(())).unwrap()
+        };
+        let part = [drawn_part::at(390.0, 280.0, 20.0)];
+        options.negatives = vec![drawn_part::picture(SIZE, &part)];
+        let beside = teach_s(&options);
+        let expected = NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 };
+        assert_eq!(beside.model.facts().negatives, Some(expected));
+        assert!(beside.accepted_negatives.is_empty());
+        // A picture of another size, for which the region was not given, counts whole.
+        options.negatives = vec![drawn_part::picture([500, 360], &part)];
+        let whole = teach_s(&options);
+        assert_ne!(whole.model.facts().negatives, Some(expected));
     }
 
     #[test]

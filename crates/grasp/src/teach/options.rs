@@ -38,7 +38,8 @@ pub struct TeachOptions {
     pub symmetry: RotationalSymmetry,
     /// Range of sizes, relative to the nominal one, at which the part is searched.
     pub size_tolerance: RangeInclusive<f64>,
-    /// The region of pictures that the model searches; teaching itself does not use it.
+    /// The region of pictures that the model searches. In teaching, it restricts only the calibration of the score with
+    /// `negatives`.
     pub region: Option<SearchRegion>,
     /// The lengths returned by [`crate::seen_from_above`], if it made the demonstrations.
     pub lengths: Option<Lengths>,

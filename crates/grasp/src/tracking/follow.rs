@@ -131,7 +131,8 @@ impl SizedPart {
         let bounds = demonstration.outline(start).bounds();
         let margin = (reach.shift_px + BORDER_PX) * self.working.shrink();
         let search = &self.prepared.search;
-        let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / self.working.cutout_scale);
+        let working_scale = self.prepared.working_from_cutout.scale;
+        let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / working_scale);
         let view = self.view(detector, picture, &bounds, margin, step)?;
         let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
         // The table's colours are needed only for a close look.
@@ -221,10 +222,10 @@ impl SizedPart {
     }
 
     fn view_from_working(&self, view: &View, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
-        view.view_from_frame.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
+        view.view_from_frame.compose(image_from_cutout).compose(&self.prepared.working_from_cutout.inverse())
     }
 
     fn image_from_cutout(&self, view: &View, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
-        view.view_from_frame.inverse().compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+        view.view_from_frame.inverse().compose(view_from_working).compose(&self.prepared.working_from_cutout)
     }
 }

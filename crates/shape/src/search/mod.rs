@@ -76,6 +76,9 @@ impl SearchConfig {
     pub const DEFAULT_NUM_POINTS: usize = 64;
     /// The value of [`Default`] for [`max_starts`](Self::max_starts): about a hundred per scale. Chosen by hand.
     pub const DEFAULT_MAX_STARTS: usize = 1024;
+    /// Bounds of [`scales`](Self::scales); outside them the part at the swept level is too small or too large. Chosen by
+    /// hand, not measured.
+    pub const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
 }
 
 impl SearchConfig {
@@ -133,9 +136,6 @@ const MIN_SWEEP_POINTS: usize = 32;
 const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
 /// Bounds of [`SearchConfig::max_starts`]. Chosen by hand.
 const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
-/// Bounds of the range of scales; outside them the part at the swept level is too small or too large. Chosen by
-/// hand, not measured.
-const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
 /// Starts that are climbed together. Chosen by hand to save time.
 const STARTS_AT_ONCE: usize = 64;
 /// Climbed starts that are followed to full resolution together. Chosen by hand to save time.
@@ -556,7 +556,8 @@ const _: () =
 
 fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
     let (least, largest) = (*config.scales.start(), *config.scales.end());
-    let within = |scale: f64| (SCALE_BOUNDS.0..=SCALE_BOUNDS.1).contains(&scale);
+    let (lowest, highest) = SearchConfig::SCALE_BOUNDS;
+    let within = |scale: f64| (lowest..=highest).contains(&scale);
     let checks = [
         ("scales", "from 0.5 on", least, within(least)),
         ("scales", "up to 2, and no less than the lower end", largest, within(largest) && largest >= least),
