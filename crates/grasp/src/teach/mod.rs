@@ -111,7 +111,7 @@ pub fn teach(
         let of_known_size = by_search.clone().of_known_size()?;
         lengths.edges = edge_height(of_known_size.demonstrations(), demonstrations, options.symmetry, lengths)?;
     }
-    let mut taught = match NetworkTeaching::new(&options) {
+    let mut taught = match NetworkTeaching::new(&options, demonstrations[0].image.dimensions().into()) {
         Some(teaching) => teach_network(demonstrations, &alone, &teaching, &options, observe, start)?,
         None => {
             by_search.score_calibration.resemblance =
