@@ -278,7 +278,8 @@ pub(crate) fn teach_network(
 
     let recurring = |i: u64| teaching.distinct_samples.map_or(i, |distinct| i % distinct);
     let windows = augmenter.windows(teaching.detector.network.input.size_divisibility as u32);
-    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), options.seed);
+    let resize_rule = teaching.detector.network.input.resize;
+    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), resize_rule, options.seed);
     let source = SampleSource {
         frames: &|i| {
             let whole = || absent.sample(i, augmenter.output_size());
