@@ -155,6 +155,9 @@ fn resnets_of_three_depths_fill_a_backbone_straight_and_converted() {
         }
         write_torchvision_model(model, &theirs);
         let straight = assert_fills_backbone(&theirs, &network, &["fc.bias", "fc.weight"]);
+        // A classifier's norms add 1e-5 to the variance, which is 1 here; those of torchvision's detectors add nothing.
+        let variances = &straight.parameters["backbone.bottom_up.res3.0.conv2.norm.running_var"].values;
+        assert!(variances.iter().all(|variance| *variance == 1.0 + 1e-5), "{model}: {variances:?}");
         let output = sdg(&["weights", "convert", theirs.to_str().unwrap(), ours.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{output:?}");
         let stdout = text(output.stdout);
