@@ -1,6 +1,6 @@
 //! Base weights for teaching: this project's own, or a checkpoint of any format, loaded into the taught network.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -56,6 +56,8 @@ pub fn read_own(
         names.iter().for_each(|name| drop(weights.parameters.remove(name)));
         weights.reinitialized.extend(names);
     }
+    let is_named = |name: &&String| reinitialized.iter().any(|part| is_part_of(name, part));
+    weights.not_imprinted = weights.reinitialized.iter().filter(is_named).cloned().collect();
     Ok(Some((weights, file.origin)))
 }
 
@@ -105,6 +107,7 @@ pub fn read(
         parameters,
         reinitialized,
         imprint: StateDict::new(),
+        not_imprinted: BTreeSet::new(),
         comparison: StateDict::new(),
         orientation: None,
     })
