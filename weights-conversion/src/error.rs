@@ -22,7 +22,8 @@ pub enum WeightsError {
     /// A pickle that requires a function or class which weights do not need.
     #[error(
         "refused: the pickle asks for {name} (byte {offset}); weights need only numpy arrays, torch tensors and dicts: \
-         write them alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"model\"], \"NEW.pth\")"
+         write them alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False).state_dict(), \"NEW.pth\") for \
+         a whole model, and with [\"model\"] or [\"state_dict\"] instead of .state_dict() for a training checkpoint"
     )]
     ForbiddenGlobal {
         /// Module and name, as the file spells them.

@@ -75,13 +75,18 @@ impl TeachingProgress {
             }
         }
         if self.interrupt.is_requested() {
-            if !self.told_of_interrupt {
+            if !self.told_of_interrupt && self.has_network() {
                 self.told_of_interrupt = true;
                 self.line("interrupted: keeping the best network so far; press Ctrl-C again to stop at once");
             }
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
+    }
+
+    /// Whether there is a network to keep after Ctrl-C; without one, teaching ends with an error that says so.
+    fn has_network(&self) -> bool {
+        !self.last_validation.is_empty()
     }
 
     fn show_validation(&mut self, record: &ValidationRecord) {
@@ -150,6 +155,7 @@ fn clock(secs: f64) -> String {
 mod tests {
     use super::*;
     use indicatif::TermLike;
+    use sdg_grasp::Validation;
     use std::io;
     use std::sync::{Arc, Mutex};
 
@@ -206,6 +212,23 @@ mod tests {
         let written = plain(&terminal.0.lock().unwrap());
         assert!(written.contains("59:59 gone, 59:59 left, loss"), "{written}");
         assert!(written.lines().all(|line| line.chars().count() <= 80), "{written}");
+    }
+
+    #[test]
+    fn a_network_is_kept_only_after_the_first_validation_of_the_detector() {
+        let mut progress = TeachingProgress { bar: None, ..TeachingProgress::new(Interrupt::default()) };
+        let angles = TeachingEvent::OrientationStep { step: 0, planned_steps: 60, loss: 5.9, elapsed_secs: 0.2 };
+        assert!(progress.show(&angles).is_continue() && !progress.has_network());
+        let validation = Validation {
+            positives: 4,
+            hits: 3,
+            median_error_px: 1.0,
+            median_error_degrees: 1.0,
+            negatives: 1,
+            false_alarms: 0,
+        };
+        let record = ValidationRecord { steps_done: 40, elapsed_secs: 9.0, validation };
+        assert!(progress.show(&TeachingEvent::Validated(record)).is_continue() && progress.has_network());
     }
 
     #[test]

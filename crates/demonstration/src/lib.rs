@@ -66,8 +66,8 @@ mod yolo_pose;
 
 pub use annotation::{Annotation, ImageFacts};
 pub use augmentation::{
-    AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle, Windows,
-    output_size_of, sample_size,
+    AugmentationConfig, AugmentationStyle, Augmenter, MIN_SAMPLE_SIDE_PX, PaperStyle, Sample, SampleObject, SceneStyle,
+    Windows, output_size_of, sample_size,
 };
 pub use coco::CocoFile;
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};

@@ -15,6 +15,9 @@ const MAX_BLOCKS: usize = 64;
 const MAX_LIST: usize = 32;
 /// Maximum side of pooled squares, in cells; Detectron2 and torchvision use at most 14.
 const MAX_POOLED: usize = 64;
+/// Maximum number of anchors of a level that go through the NMS of a detection; its time grows with the square of their
+/// number. Detectron2 and torchvision use at most 6000.
+const MAX_PRE_NMS: usize = 10_000;
 
 fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString) -> Result<()> {
     if holds {
@@ -102,6 +105,13 @@ impl RcnnConfig {
                 format!("{}, {}", sampler.batch_size_per_image, sampler.positive_fraction),
             )?;
         }
+        let pre_nms = self.rpn.pre_nms_top_n.test;
+        check(
+            pre_nms <= MAX_PRE_NMS,
+            "rpn.pre_nms_top_n.test",
+            &format!("at most {MAX_PRE_NMS} anchors per level"),
+            pre_nms,
+        )?;
         check(self.roi_heads.num_classes > 0, "roi_heads.num_classes", "at least 1", self.roi_heads.num_classes)?;
         if let Some(head) = &self.roi_heads.keypoint_head {
             check(head.num_keypoints > 0, "roi_heads.keypoint_head.num_keypoints", "at least 1", head.num_keypoints)?;
@@ -225,6 +235,7 @@ mod tests {
         assert_eq!(field(|c| c.fpn.channels = 1 << 20), "fpn.channels");
         assert_eq!(field(|c| c.anchors.aspect_ratios = vec![1.0; 33]), "anchors.aspect_ratios");
         assert_eq!(field(|c| c.roi_heads.box_head.pooler.output_size = 65), "roi_heads.box_head.pooler");
+        assert_eq!(field(|c| c.rpn.pre_nms_top_n.test = 10_001), "rpn.pre_nms_top_n.test");
         assert_eq!(field(|c| c.rpn.post_nms_top_n.test = usize::MAX), "roi_heads.box_head");
         assert_eq!(field(|c| c.roi_heads.box_head.fc_channels = usize::MAX), "roi_heads.box_head");
         assert_eq!(field(|c| c.roi_heads.box_head.detections_per_image = usize::MAX), "roi_heads.keypoint_head");

@@ -6,7 +6,7 @@ use sdg_cell::drawing;
 use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
 use sdg_geometry::PlanarGrasp;
 use sdg_grasp::{
-    GraspModel, HIT_DEGREES, HIT_PX, History, Taught, TaughtDemonstration, ValidationRecord, Verification,
+    GraspModel, HIT_DEGREES, HIT_PX, History, LossValues, Taught, TaughtDemonstration, ValidationRecord, Verification,
 };
 use sdg_report::{
     Axis, Chart, Color, Figure, GallerySize, KeyFigure, Pen, Report, Section, Series, Tone, draw_box,
@@ -200,14 +200,22 @@ fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
 
 /// The losses and the validation by step.
 pub fn teaching(history: &History) -> Section {
-    let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
-        history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
-    };
-    let losses = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
-        .series(Series::new("keypoints", loss(|l| l.keypoint)).noisy())
-        .series(Series::new("class and box", loss(|l| l.cls + l.box_reg)).noisy())
-        .series(Series::new("proposals", loss(|l| l.rpn_cls + l.rpn_loc)).noisy())
+    let parts: [(&str, fn(&LossValues) -> f64); 4] = [
+        ("keypoints", |l| l.keypoint),
+        ("masks", |l| l.mask),
+        ("class and box", |l| l.cls + l.box_reg),
+        ("proposals", |l| l.rpn_cls + l.rpn_loc),
+    ];
+    let mut losses = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
         .caption("Each step, and its running mean.");
+    for (name, pick) in parts {
+        let points: Vec<(f64, f64)> =
+            history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect();
+        // The loss of a head that the detector lacks is zero, which a logarithmic axis cannot show.
+        if points.iter().any(|(_, loss)| *loss > 0.0) {
+            losses = losses.series(Series::new(name, points).noisy());
+        }
+    }
     let curve = |pick: fn(&ValidationRecord) -> f64| -> Vec<(f64, f64)> {
         history.validations.iter().map(|record| (record.steps_done as f64, pick(record))).collect()
     };
@@ -239,4 +247,35 @@ pub fn teaching(history: &History) -> Section {
             history.elapsed_secs
         ))
         .charts(vec![losses, place, angle, found])
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_grasp::{Ending, StepRecord, Validation};
+
+    use super::*;
+
+    #[test]
+    fn the_chart_has_the_losses_of_the_heads_that_were_taught() {
+        let validation = Validation {
+            positives: 3,
+            hits: 3,
+            median_error_px: 1.0,
+            median_error_degrees: 1.0,
+            negatives: 1,
+            false_alarms: 0,
+        };
+        let best = ValidationRecord { steps_done: 1, elapsed_secs: 1.0, validation };
+        let names = |keypoint: f64, mask: f64| {
+            let losses = LossValues { rpn_cls: 0.3, rpn_loc: 0.2, cls: 0.4, box_reg: 0.1, keypoint, mask };
+            let step = StepRecord { step: 0, samples: 4, learning_rate: 1e-3, losses };
+            let ending = Ending::Completed;
+            let history = History { steps: vec![step], validations: vec![best], best, ending, elapsed_secs: 1.0 };
+            let page = format!("{:?}", teaching(&history));
+            ["keypoints", "masks", "class and box", "proposals"].map(|name| page.contains(&format!("name: \"{name}\"")))
+        };
+        assert_eq!(names(0.0, 0.5), [false, true, true, true]);
+        assert_eq!(names(2.0, 0.0), [true, false, true, true]);
+        assert_eq!(names(2.0, 0.5), [true; 4]);
+    }
 }

@@ -29,6 +29,8 @@ pub struct BaseWeights {
     pub reinitialized: BTreeSet<String>,
     /// Weights that compute last layers from a part's views; empty if there are none.
     pub imprint: StateDict,
+    /// Parameters that are not computed from a part's views, because the user wants random values.
+    pub not_imprinted: BTreeSet<String>,
     /// The comparison network, which is not taught; empty if there is none.
     pub comparison: StateDict,
     /// The initial weights of model A's orientation CNN; `None` if there are none.
@@ -79,7 +81,8 @@ impl BaseWeights {
         if let Some(found) = first_misfit(&report) {
             return Err(GraspError::BaseWeights { fitting: report.applied.len(), found });
         }
-        let layers = imprint.last_layers(&detector.valid(), images, targets)?;
+        let mut layers = imprint.last_layers(&detector.valid(), images, targets)?;
+        layers.retain(|name, _| !self.not_imprinted.contains(name));
         Ok(state_dict::import(detector, &layers).0)
     }
 
@@ -172,9 +175,19 @@ mod tests {
             parameters,
             reinitialized: BTreeSet::new(),
             imprint: StateDict::new(),
+            not_imprinted: BTreeSet::new(),
             comparison: StateDict::new(),
             orientation: None,
         }
+    }
+
+    /// A picture of 64 × 64 pixels and a part on it.
+    fn view() -> (RgbImage, Target) {
+        let image = RgbImage::from_fn(64, 64, |x, y| Rgb([(x * 4) as u8, (y * 4) as u8, 90]));
+        let bbox = sdg_geometry::BoundingBox { x1: 10.0, y1: 12.0, x2: 50.0, y2: 44.0 };
+        let point = |i: usize| nalgebra::Point2::new(12.0 + 3.0 * i as f64, 15.0 + 2.0 * i as f64);
+        let keypoints = (0..crate::NUM_KEYPOINTS).map(|i| sdg_geometry::Keypoint::visible(point(i))).collect();
+        (image, Target { boxes: vec![bbox], labels: vec![0], keypoints: vec![keypoints], masks: Vec::new() })
     }
 
     #[test]
@@ -184,11 +197,7 @@ mod tests {
         let mut network = base.apply(config.init(&Device::flex().autodiff(), 1).unwrap()).unwrap();
         assert_eq!(state_dict::export(&network), base.parameters);
 
-        let image = RgbImage::from_fn(64, 64, |x, y| Rgb([(x * 4) as u8, (y * 4) as u8, 90]));
-        let bbox = sdg_geometry::BoundingBox { x1: 10.0, y1: 12.0, x2: 50.0, y2: 44.0 };
-        let point = |i: usize| nalgebra::Point2::new(12.0 + 3.0 * i as f64, 15.0 + 2.0 * i as f64);
-        let keypoints = (0..crate::NUM_KEYPOINTS).map(|i| sdg_geometry::Keypoint::visible(point(i))).collect();
-        let target = Target { boxes: vec![bbox], labels: vec![0], keypoints: vec![keypoints], masks: Vec::new() };
+        let (image, target) = view();
         let images = [network.image_transform().apply(&image).unwrap()];
         let clipping = Some(GradientClippingConfig::Norm(10.0));
         let mut optimizer = AdamWConfig::new().with_grad_clipping(clipping).init();
@@ -202,6 +211,26 @@ mod tests {
             let is_frozen = name.contains("stem.") || name.contains("res2.") || name.contains(".norm.");
             assert_eq!(trained[name] == *before, is_frozen, "{name}");
         }
+    }
+
+    #[test]
+    fn a_part_that_the_user_initialises_randomly_is_not_imprinted() {
+        let config = narrow();
+        let mut base = base(&config);
+        base.imprint = state_dict::export(&Imprint::init(8, 8, &mut Initializer::new(&Device::flex(), 6)));
+        let network = config.init(&Device::flex().autodiff(), 1).unwrap();
+        let before = state_dict::export(&network);
+        let (image, target) = view();
+        let images = [network.image_transform().apply(&image).unwrap()];
+        let changed = |base: &BaseWeights| -> BTreeSet<String> {
+            let imprinted = base.imprint(network.clone(), &images, std::slice::from_ref(&target)).unwrap();
+            let after = state_dict::export(&imprinted);
+            after.into_iter().filter(|(name, value)| before[name] != *value).map(|(name, _)| name).collect()
+        };
+        let scores = "roi_heads.box_predictor.cls_score.weight";
+        assert!(changed(&base).contains(scores));
+        base.not_imprinted.insert(scores.to_owned());
+        assert!(!changed(&base).contains(scores));
     }
 
     #[test]

@@ -119,6 +119,7 @@ impl BaseWeightsFile {
                 .collect(),
             reinitialized: self.reinitialized.iter().filter(own).cloned().collect(),
             imprint: self.named("imprint."),
+            not_imprinted: BTreeSet::new(),
             comparison: self.named("comparison."),
             orientation: Some(OrientationStart {
                 parameters: self.named("orientation."),

@@ -1,14 +1,16 @@
 //! Base weights for teaching: this project's own, or a checkpoint of any format, loaded into the taught network.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
-use sdg_detection::config::ImageTransformConfig;
+use sdg_detection::config::{ImageTransformConfig, NormKind};
 use sdg_grasp::{BaseWeights, BaseWeightsFile, TeachOptions};
 use sdg_layers::state_dict::{StateDict, WeightTensor};
-use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, is_part_of, naming_of, sha256_of};
+use sdg_weights_conversion::{
+    Checkpoint, Conversion, Naming, Report, Source, is_backbone_alone, is_part_of, naming_of, sha256_of,
+};
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
 
@@ -17,6 +19,9 @@ pub type Origin = BTreeMap<String, String>;
 
 /// Maximum size of this project's base weights.
 const MAX_OWN_BYTES: u64 = 64 << 20;
+/// Value that the norms of a backbone alone add to their variance, in Detectron2 and in torchvision. Only the norms of
+/// torchvision's detectors add nothing, and only with their COCO weights.
+const BACKBONE_EPS: f64 = 1e-5;
 
 /// Reads this project's base weights for the network of `options`, and their [`Origin`]. Parameters of the parts in
 /// `reinitialized`, such as `roi_heads.box_predictor`, are left out. `None` if the file is of another kind, or the
@@ -51,6 +56,8 @@ pub fn read_own(
         names.iter().for_each(|name| drop(weights.parameters.remove(name)));
         weights.reinitialized.extend(names);
     }
+    let is_named = |name: &&String| reinitialized.iter().any(|part| is_part_of(name, part));
+    weights.not_imprinted = weights.reinitialized.iter().filter(is_named).cloned().collect();
     Ok(Some((weights, file.origin)))
 }
 
@@ -85,14 +92,22 @@ pub fn read(
     let conversion = Conversion::plan(&checkpoint, &architecture, reinitialized).with_context(named)?;
     tell(conversion.report())?;
     let values = conversion.values(&mut source).with_context(named)?;
-    let parameters: StateDict =
+    let mut parameters: StateDict =
         values.into_iter().map(|(name, (shape, values))| (name, WeightTensor { shape, values })).collect();
+    if is_backbone_alone(&checkpoint, conversion.report().naming)
+        && let NormKind::FrozenBatch { eps } = network.backbone.norm
+    {
+        for (_, variance) in parameters.iter_mut().filter(|(name, _)| name.ends_with(".norm.running_var")) {
+            variance.values.iter_mut().for_each(|value| *value = (f64::from(*value) + (BACKBONE_EPS - eps)) as f32);
+        }
+    }
     let reinitialized = architecture.parameters().into_keys().filter(|name| !parameters.contains_key(name)).collect();
     Ok(BaseWeights {
         sha256: sha256_of(path).with_context(named)?,
         parameters,
         reinitialized,
         imprint: StateDict::new(),
+        not_imprinted: BTreeSet::new(),
         comparison: StateDict::new(),
         orientation: None,
     })

@@ -16,6 +16,9 @@ use crate::{Demonstration, Error, Result};
 /// Width and height of a window relative to the part's largest diameter. In smaller windows the part fits only at some
 /// angles.
 const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
+/// Minimum width and height of a part's box in the paper's samples, in pixels; readers of annotations refuse smaller
+/// boxes.
+const MIN_SHOWN_PX: f64 = 1.0;
 
 /// Makes samples from demonstrations: sample *i* of seed *s* is always the same, in any order of calls.
 ///
@@ -125,7 +128,10 @@ impl Augmenter {
                 // OpenDR's boxes are hulls of the rotated box, independent of the outline.
                 let hull = BoundingBox::around(part.drawn_box.corners().iter().map(|corner| pose.apply(corner)));
                 let bbox = hull.map_or(object.bbox, |hull| hull.clip(f64::from(width), f64::from(height)));
-                Sample { image: draw.paint(part, width, height), objects: vec![SampleObject { bbox, ..object }] }
+                // The paper's shifts and turns may move a part near the photo's border out of the sample.
+                let is_shown = bbox.width() >= MIN_SHOWN_PX && bbox.height() >= MIN_SHOWN_PX;
+                let objects = if is_shown { vec![SampleObject { bbox, ..object }] } else { Vec::new() };
+                Sample { image: draw.paint(part, width, height), objects }
             }
             AugmentationStyle::Scenes(style) => {
                 let studio = Studio {

@@ -4,8 +4,10 @@ use std::ops::RangeInclusive;
 
 use crate::{Error, Result};
 
+/// Minimum width and height of a sample, in pixels.
+pub const MIN_SAMPLE_SIDE_PX: u32 = 16;
 /// Width and height that a sample may have, in pixels.
-const SIDES: RangeInclusive<u32> = 16..=8192;
+const SIDES: RangeInclusive<u32> = MIN_SAMPLE_SIDE_PX..=8192;
 /// Photos of up to this many pixels give samples of their own size: phones usually take photos of 4032 × 3024 pixels.
 const MAX_OWN_PIXELS: f64 = 4096.0 * 3072.0;
 /// Maximum number of pixels of a sample of a larger photo. Derived from a limit of 2 GB: the 48 samples on which a
@@ -184,7 +186,7 @@ pub fn sample_size(photo: [u32; 2], max_pixels: f64) -> [u32; 2] {
     if shrink >= 1.0 {
         return photo;
     }
-    photo.map(|side| ((f64::from(side) * shrink).round() as u32).max(*SIDES.start()))
+    photo.map(|side| ((f64::from(side) * shrink).round() as u32).max(MIN_SAMPLE_SIDE_PX))
 }
 
 fn pixels([width, height]: [u32; 2]) -> f64 {

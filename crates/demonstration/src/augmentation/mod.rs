@@ -33,5 +33,7 @@ mod tests;
 mod warp;
 
 pub use augmenter::{Augmenter, Windows};
-pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle, output_size_of, sample_size};
+pub use config::{
+    AugmentationConfig, AugmentationStyle, MIN_SAMPLE_SIDE_PX, PaperStyle, SceneStyle, output_size_of, sample_size,
+};
 pub use sample::{Sample, SampleObject};

@@ -13,7 +13,7 @@ use crate::Annotation;
 pub struct Sample {
     /// The picture.
     pub image: RgbImage,
-    /// The parts on it; empty for a scene without the part.
+    /// The parts on it; empty for a scene without the part, and in the paper's style if the part is outside the picture.
     pub objects: Vec<SampleObject>,
 }
 

@@ -118,6 +118,19 @@ fn a_drawn_dot_lands_at_its_keypoint() {
     assert!(check_dots((0..40).map(|i| paper.sample(i))) > 40);
 }
 
+#[test]
+fn a_part_outside_a_paper_sample_is_no_object() {
+    let mut near_corner = demonstration(false);
+    near_corner.annotation.bbox = BoundingBox { x1: 60.0, y1: 60.0, x2: 140.0, y2: 140.0 };
+    near_corner.annotation.grasp = None;
+    let paper = Augmenter::new(&[near_corner], AugmentationConfig::paper().with_output_size(160, 120), 5).unwrap();
+    let samples: Vec<Sample> = (0..200).map(|index| paper.sample(index)).collect();
+    let boxes: Vec<BoundingBox> = samples.iter().flat_map(|sample| &sample.objects).map(|object| object.bbox).collect();
+    assert!(boxes.iter().all(|bbox| bbox.width() >= 1.0 && bbox.height() >= 1.0), "{boxes:?}");
+    // About 7 % of the poses move this part out of the picture.
+    assert!((170..200).contains(&boxes.len()), "{} of 200 samples with the part", boxes.len());
+}
+
 /// The box of the pixels that are clearly redder than they are green.
 fn red_box(image: &RgbImage) -> Option<BoundingBox> {
     let red = image.enumerate_pixels().filter(|(_, _, p)| f64::from(p[0]) > 2.2 * f64::from(p[1]) + 12.0);

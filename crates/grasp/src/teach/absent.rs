@@ -14,6 +14,8 @@ use sdg_demonstration::random::scramble;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle, output_size_of,
 };
+use sdg_detection::config::ResizeRule;
+use sdg_detection::image_transform::resized_size;
 use sdg_geometry::{BoundingBox, percentile};
 
 use super::options::TeachOptions;
@@ -58,20 +60,31 @@ pub(super) struct AbsentSamples {
 }
 
 impl AbsentSamples {
-    /// Resizes the pictures so that they cover frames of the samples' size.
-    pub(super) fn new(pictures: &[RgbImage], [width, height]: [u32; 2], seed: u64) -> Self {
-        let covering = |picture: &RgbImage| {
-            let across = f64::from(width) / f64::from(picture.width());
-            let down = f64::from(height) / f64::from(picture.height());
-            let scale = across.max(down);
-            let side = |length: u32, least: u32| ((f64::from(length) * scale).round() as u32).max(least);
-            let [wide, high] = [side(picture.width(), width), side(picture.height(), height)];
-            if (wide, high) == picture.dimensions() {
-                return picture.clone();
+    /// Resizes the pictures to the scale of their detection, at which the detector's rule resizes whole pictures.
+    /// Pictures smaller than frames of the samples' size are extended by the colours of their right and lower edges.
+    pub(super) fn new(pictures: &[RgbImage], [width, height]: [u32; 2], rule: ResizeRule, seed: u64) -> Self {
+        // The detector resizes the samples as well.
+        let of_frame = resized_size(rule, width, height);
+        let as_detected = |picture: &RgbImage| {
+            let detected = resized_size(rule, picture.width(), picture.height());
+            let side = |detected: usize, frame: u32, of_frame: usize| {
+                ((detected as f64 * f64::from(frame) / of_frame as f64).round() as u32).max(1)
+            };
+            let wide = side(detected.0, width, of_frame.0);
+            let high = side(detected.1, height, of_frame.1);
+            let resized = if (wide, high) == picture.dimensions() {
+                picture.clone()
+            } else {
+                imageops::resize(picture, wide, high, imageops::FilterType::Triangle)
+            };
+            if wide >= width && high >= height {
+                return resized;
             }
-            imageops::resize(picture, wide, high, imageops::FilterType::Triangle)
+            RgbImage::from_fn(wide.max(width), high.max(height), |x, y| {
+                *resized.get_pixel(x.min(wide - 1), y.min(high - 1))
+            })
         };
-        Self { pictures: pictures.iter().map(covering).collect(), seed }
+        Self { pictures: pictures.iter().map(as_detected).collect(), seed }
     }
 
     /// Sample `index` if it is one without the part: a window of one picture at a place determined by seed and index.
@@ -206,6 +219,7 @@ mod tests {
     use crate::teach::teach;
     use crate::teach::tests::demonstration;
     use burn::tensor::Device;
+    use sdg_detection::config::SizeRounding;
     use sdg_geometry::PlanarSimilarity;
     use std::ops::ControlFlow;
 
@@ -227,7 +241,8 @@ mod tests {
             RgbImage::from_pixel(40, 30, image::Rgb([9, 9, 9])),
             RgbImage::from_pixel(640, 480, image::Rgb([200, 0, 0])),
         ];
-        let absent = AbsentSamples::new(&pictures, [160, 120], 5);
+        let rule = ResizeRule::FitWithin { width_px: 160, height_px: 120 };
+        let absent = AbsentSamples::new(&pictures, [160, 120], rule, 5);
         let drawn: Vec<(u64, Sample)> = (0..48).filter_map(|i| Some((i, absent.sample(i, [64, 48])?))).collect();
         assert_eq!(drawn.iter().map(|(i, _)| *i).collect::<Vec<_>>(), [11, 23, 35, 47]);
         for (i, (_, sample)) in drawn.iter().enumerate() {
@@ -235,7 +250,26 @@ mod tests {
             assert_eq!(sample.image.get_pixel(3, 3)[0], [9, 200][i % 2]);
             assert!(sample.objects.is_empty());
         }
-        assert_eq!(AbsentSamples::new(&[], [160, 120], 5).sample(11, [64, 48]), None);
+        assert_eq!(AbsentSamples::new(&[], [160, 120], rule, 5).sample(11, [64, 48]), None);
+    }
+
+    #[test]
+    fn a_picture_of_another_shape_has_the_scale_of_its_detection() {
+        // Bright in its upper half.
+        let picture = RgbImage::from_fn(1920, 1080, |_, y| image::Rgb([if y < 540 { 200 } else { 20 }; 3]));
+        let bright_rows = |[width, height]: [u32; 2], rule: ResizeRule| {
+            let absent = AbsentSamples::new(std::slice::from_ref(&picture), [width, height], rule, 5);
+            let sample = absent.sample(11, [width, height]).unwrap().image;
+            assert_eq!(sample.dimensions(), (width, height));
+            (0..height).filter(|&y| sample.get_pixel(100, y)[0] > 128).count()
+        };
+        // 320 / 1920 of 540 rows.
+        assert_eq!(bright_rows([320, 240], ResizeRule::FitWithin { width_px: 320, height_px: 240 }), 90);
+        let rule = |short_px| ResizeRule::ShortSide { short_px, max_long_px: 1333, rounding: SizeRounding::Nearest };
+        // 480 / 1080 of 540 rows.
+        assert_eq!(bright_rows([640, 480], rule(480)), 240);
+        // 1333 / 1920 of 540 rows after the samples are enlarged by 800 / 480.
+        assert_eq!(bright_rows([640, 480], rule(800)), 225);
     }
 
     #[test]

@@ -111,7 +111,7 @@ pub fn teach(
         let of_known_size = by_search.clone().of_known_size()?;
         lengths.edges = edge_height(of_known_size.demonstrations(), demonstrations, options.symmetry, lengths)?;
     }
-    let mut taught = match NetworkTeaching::new(&options) {
+    let mut taught = match NetworkTeaching::new(&options, demonstrations[0].image.dimensions().into()) {
         Some(teaching) => teach_network(demonstrations, &alone, &teaching, &options, observe, start)?,
         None => {
             by_search.score_calibration.resemblance =
@@ -278,7 +278,8 @@ pub(crate) fn teach_network(
 
     let recurring = |i: u64| teaching.distinct_samples.map_or(i, |distinct| i % distinct);
     let windows = augmenter.windows(teaching.detector.network.input.size_divisibility as u32);
-    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), options.seed);
+    let resize_rule = teaching.detector.network.input.resize;
+    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), resize_rule, options.seed);
     let source = SampleSource {
         frames: &|i| {
             let whole = || absent.sample(i, augmenter.output_size());

@@ -50,8 +50,9 @@ pub(crate) enum ReadingTeaching {
 }
 
 impl NetworkTeaching {
-    /// The settings for options with initial weights already read; `None` for model S, which has no network.
-    pub(crate) fn new(options: &TeachOptions) -> Option<Self> {
+    /// The settings for options with initial weights already read, and for a first photo of this width and height;
+    /// `None` for model S, which has no network.
+    pub(crate) fn new(options: &TeachOptions, photo: [u32; 2]) -> Option<Self> {
         let &TeachOptions { kind, preset, seed, symmetry, .. } = options;
         let reading = match kind {
             ModelKind::A => ReadingTeaching::BoxAndCrop(Box::new(preset.orientation(symmetry, seed))),
@@ -65,7 +66,7 @@ impl NetworkTeaching {
             detector: preset.detector(kind, weights.is_some())?,
             reading,
             training: preset.training(kind, seed),
-            samples: preset.samples(),
+            samples: preset.samples(photo),
             distinct_samples: (preset == Preset::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match preset {
                 Preset::Paper => AugmentationConfig::paper(),
@@ -105,5 +106,33 @@ impl NetworkTeaching {
         }
         self.training.steps = steps;
         self.training.validation.first = self.training.validation.first.min(steps);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_detection::image_transform::resized_size;
+
+    use super::*;
+
+    #[test]
+    fn samples_show_the_part_at_the_scale_of_detection() {
+        // Sizes are rounded to whole pixels.
+        const TOLERANCE: f64 = 0.01;
+        for preset in Preset::ALL {
+            let options = TeachOptions { preset, ..TeachOptions::new(1) };
+            for photo in [[640, 480], [4032, 3024], [1920, 1080], [480, 640], [480, 480], [3000, 500]] {
+                let teaching = NetworkTeaching::new(&options, photo).unwrap();
+                let sample = teaching.samples.output_size.unwrap();
+                let rule = teaching.detector.network.input.resize;
+                let resized = |[width, height]: [u32; 2]| resized_size(rule, width, height).0 as f64 / f64::from(width);
+                let fitted = |axis: usize| f64::from(sample[axis]) / f64::from(photo[axis]);
+                let ratio = fitted(0).min(fitted(1)) * resized(sample) / resized(photo);
+                assert!((ratio - 1.0).abs() < TOLERANCE, "{} {photo:?}: {ratio}", preset.name());
+                if preset != Preset::Edge && 3 * photo[0] == 4 * photo[1] {
+                    assert_eq!(sample, [640, 480], "{} {photo:?}", preset.name());
+                }
+            }
+        }
     }
 }

@@ -17,14 +17,13 @@ use sdg_detection::config::{Freeze, NormKind};
 use sdg_detection::presets::{RcnnKind, r50_detectron2};
 use sdg_training::{OneCycle, Optimizer, TrainingConfig, ValidationConfig};
 
+use super::r50;
 use crate::facts::ModelKind;
 
 /// Number of samples, which are repeated in the same order.
 pub(super) const DISTINCT_SAMPLES: u64 = 1500;
 /// Number of held-out samples.
 const HELD_BACK: usize = 200;
-/// Width and height of the samples, in pixels.
-const SAMPLE_SIZE: [u32; 2] = [640, 480];
 
 /// Detectron2's R50-FPN. With imported weights, stem, res2 and norms are frozen. From random values nothing is frozen:
 /// all layers learn, and the frozen norms, which would have no effect, are replaced by group norms.
@@ -59,6 +58,8 @@ pub(super) fn training(kind: ModelKind, seed: u64) -> TrainingConfig {
     }
 }
 
-pub(super) fn samples() -> AugmentationConfig {
-    AugmentationConfig::paper().with_output_size(SAMPLE_SIZE[0], SAMPLE_SIZE[1])
+/// The training samples of a photo: 640 × 480 pixels for a photo of this shape.
+pub(super) fn samples(photo: [u32; 2]) -> AugmentationConfig {
+    let [width, height] = r50::sample_size(photo);
+    AugmentationConfig::paper().with_output_size(width, height)
 }

@@ -76,14 +76,16 @@ impl Preset {
         }
     }
 
-    /// The training samples. Except for `paper`, they have the network's input size, so that no computation is wasted.
-    pub(super) fn samples(self) -> AugmentationConfig {
+    /// The training samples of a first photo of this width and height. Except for `paper`, they have the network's
+    /// input size, so that no computation is wasted.
+    pub(super) fn samples(self, photo: [u32; 2]) -> AugmentationConfig {
         match self {
             Self::Edge => AugmentationConfig::default().with_output_size(320, 240),
             Self::R50Detectron2 | Self::R50Torchvision => {
-                AugmentationConfig::default().with_output_size(640, r50::SHORT_SIDE_PX)
+                let [width, height] = r50::sample_size(photo);
+                AugmentationConfig::default().with_output_size(width, height)
             }
-            Self::Paper => paper::samples(),
+            Self::Paper => paper::samples(photo),
         }
     }
 

@@ -1,12 +1,28 @@
 //! R50-FPN from imported weights, for a computer with two cores.
 
+use sdg_demonstration::MIN_SAMPLE_SIDE_PX;
 use sdg_detection::RcnnConfig;
-use sdg_detection::config::ResizeRule;
+use sdg_detection::config::{ResizeRule, SizeRounding};
+use sdg_detection::image_transform::resized_size;
 use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
 
 /// Short side of the images in teaching and detection with an R50. Chosen by hand to save time; its effect on accuracy
 /// was not measured.
-pub(super) const SHORT_SIDE_PX: u32 = 480;
+const SHORT_SIDE_PX: u32 = 480;
+/// Long side of the largest samples: that of the largest images in detection.
+const MAX_LONG_SIDE_PX: u32 = 1333;
+
+/// Width and height of the samples of a photo. They have the photo's shape: the size of an R50's input depends on the
+/// image's shape, and the network must learn the part at the scale at which it detects it.
+pub(super) fn sample_size([width, height]: [u32; 2]) -> [u32; 2] {
+    let rule = ResizeRule::ShortSide {
+        short_px: SHORT_SIDE_PX,
+        max_long_px: MAX_LONG_SIDE_PX,
+        rounding: SizeRounding::Nearest,
+    };
+    let (width, height) = resized_size(rule, width, height);
+    [width, height].map(|side| (side as u32).max(MIN_SAMPLE_SIDE_PX))
+}
 
 /// An R50 with the numerics of its weights, except for two changes that save minutes on such a computer. Images are not
 /// enlarged to 800 pixels, which adds no detail to a photo 480 pixels high. COCO images show dozens of objects, but

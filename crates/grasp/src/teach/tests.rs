@@ -58,7 +58,7 @@ fn shrink(network: &mut RcnnConfig) {
 }
 
 fn whole_teaching(options: &TeachOptions) -> NetworkTeaching {
-    NetworkTeaching::new(options).unwrap()
+    NetworkTeaching::new(options, PHOTO).unwrap()
 }
 
 /// A preset's settings, reduced for a test, with which any network is good enough.

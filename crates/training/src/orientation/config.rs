@@ -6,13 +6,12 @@ use sdg_demonstration::{AugmentationConfig, AugmentationStyle, SceneStyle};
 use sdg_orientation::{Labels, OrientationError, check_setting};
 
 use super::jitter::BoxJitter;
-use super::measured::AngleErrors;
 use crate::schedule::OneCycle;
 
 /// How the orientation CNN is trained.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationTraining {
-    /// Optimiser steps, unless early stop or the time budget ends the run earlier.
+    /// Optimiser steps, unless the time budget ends the run earlier.
     pub steps: usize,
     /// Crops per step.
     pub batch_size: usize,
@@ -28,8 +27,6 @@ pub struct OrientationTraining {
     pub crops: CropStyle,
     /// Number of held-out crops of a validation.
     pub validation_crops: usize,
-    /// When a run is good enough to end before its last step.
-    pub early_stop: Option<EarlyStop>,
     /// Wall-clock time for the whole run; see [`crate::TrainingConfig::time_budget`].
     pub time_budget: Option<Duration>,
     /// Seed of the crops and their order.
@@ -49,27 +46,6 @@ pub struct CropStyle {
     pub jitter: BoxJitter,
     /// Number of scenes before they repeat; `None` for unlimited new ones.
     pub distinct_scenes: Option<u64>,
-}
-
-/// The criteria for early stop. When a validation meets them, the learning rate is reduced within `cool_down` steps
-/// and the run ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EarlyStop {
-    /// Steps between validations.
-    pub every: usize,
-    /// Minimum fraction of crops within [`HIT_DEGREES`](super::HIT_DEGREES).
-    pub hit_rate: f64,
-    /// Maximum median error, in degrees.
-    pub median_degrees: f64,
-    /// Steps from the validation that was good enough to the end.
-    pub cool_down: usize,
-}
-
-impl EarlyStop {
-    /// Whether a validation is good enough.
-    pub fn is_reached(&self, errors: &AngleErrors) -> bool {
-        errors.hit_rate() >= self.hit_rate && errors.median_degrees() <= self.median_degrees
-    }
 }
 
 impl OrientationTraining {
@@ -92,7 +68,6 @@ impl OrientationTraining {
                 distinct_scenes: None,
             },
             validation_crops: 96,
-            early_stop: None,
             time_budget: None,
             seed,
         }
@@ -145,9 +120,6 @@ impl OrientationTraining {
         if let AugmentationStyle::Scenes(scenes) = &self.crops.augmentation.style {
             let share = scenes.positive_share;
             check_setting(share == 1.0, "positive_share", "1, since every crop needs the part", share)?;
-        }
-        if let Some(stop) = &self.early_stop {
-            check_setting(stop.every > 0, "early_stop.every", "at least 1 step", stop.every)?;
         }
         self.crops.jitter.validate()
     }

@@ -11,14 +11,13 @@ pub const HIT_DEGREES: f64 = 10.0;
 /// Errors of a network on some crops, in degrees. Angles that are equal by the part's symmetry count as equal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleErrors {
-    sorted: Vec<f64>,
+    degrees: Vec<f64>,
 }
 
 impl AngleErrors {
-    /// Collects errors in degrees, given in any order.
-    pub fn new(mut degrees: Vec<f64>) -> Self {
-        degrees.sort_by(f64::total_cmp);
-        Self { sorted: degrees }
+    /// Errors in degrees, in any order.
+    pub fn new(degrees: Vec<f64>) -> Self {
+        Self { degrees }
     }
 
     /// Evaluates the network on crops with known angles.
@@ -38,25 +37,18 @@ impl AngleErrors {
 
     /// Number of crops.
     pub fn count(&self) -> usize {
-        self.sorted.len()
+        self.degrees.len()
     }
 
     /// Fraction within [`HIT_DEGREES`]; zero without crops.
     pub fn hit_rate(&self) -> f64 {
-        let hits = self.sorted.iter().filter(|error| **error <= HIT_DEGREES).count();
-        hits as f64 / self.sorted.len().max(1) as f64
+        let hits = self.degrees.iter().filter(|error| **error <= HIT_DEGREES).count();
+        hits as f64 / self.degrees.len().max(1) as f64
     }
 
     /// Median in degrees; infinite without crops.
     pub fn median_degrees(&self) -> f64 {
-        median(self.sorted.iter().copied()).unwrap_or(f64::INFINITY)
-    }
-
-    /// The error that a fraction `share` of the crops does not exceed, in degrees;
-    /// infinite without crops.
-    pub fn quantile_degrees(&self, share: f64) -> f64 {
-        let last = self.sorted.len().saturating_sub(1);
-        self.sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::INFINITY)
+        median(self.degrees.iter().copied()).unwrap_or(f64::INFINITY)
     }
 }
 
@@ -68,7 +60,6 @@ mod tests {
     fn figures_by_hand() {
         let errors = AngleErrors::new(vec![3.0, 1.0, 170.0, 10.0]);
         assert_eq!((errors.count(), errors.hit_rate(), errors.median_degrees()), (4, 0.75, 6.5));
-        assert_eq!(errors.quantile_degrees(1.0), 170.0);
         let none = AngleErrors::new(vec![]);
         assert_eq!((none.hit_rate(), none.median_degrees()), (0.0, f64::INFINITY));
     }

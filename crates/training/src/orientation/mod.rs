@@ -38,7 +38,7 @@ mod start;
 mod trainer;
 
 pub use augmented::AugmentedCrops;
-pub use config::{CropStyle, EarlyStop, OrientationTraining};
+pub use config::{CropStyle, OrientationTraining};
 pub use jitter::BoxJitter;
 pub use labelled_crop::LabelledCrop;
 pub use measured::{AngleErrors, HIT_DEGREES};

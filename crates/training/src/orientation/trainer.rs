@@ -18,7 +18,7 @@ use crate::error::TrainingError;
 use crate::optimizer::Stepper;
 use crate::pace::Ending;
 use crate::prefetch::{BatchRequest, Batches, with_batches};
-use crate::run::{LossFigures, RunSettings, Step, Task, Validated, ValidationSteps, run};
+use crate::run::{LossFigures, RunSettings, Step, Task, Validated, run};
 
 /// Events of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,18 +113,18 @@ pub fn train(
         steps: training.steps,
         time_budget: training.time_budget,
         schedule: training.schedule,
-        validations: training.early_stop.map(|stop| ValidationSteps { first: stop.every, every: stop.every }),
+        validations: None,
     };
     // The number of crops of a scene depends on the part's visibility, so a batch depends on the batches before it.
     let mut crops = (0..).flat_map(scene);
     let prepare = |_: BatchRequest<()>| Ok(crops.by_ref().take(training.batch_size).collect());
     with_batches(prepare, |batches| {
-        let mut task = OrientationTask { training, batches, held_out, observe, last: None };
+        let mut task = OrientationTask { training, batches, held_out, observe, errors: None };
         let ended = run(&mut task, network, optimizer, &settings, start)?;
-        let errors = match task.last.take() {
-            Some((steps_done, errors)) if steps_done == ended.steps => errors,
+        let errors = match task.errors.take() {
+            Some(errors) => errors,
             // The run was interrupted, so the network was not measured yet.
-            _ => task.measure(&ended.network, ended.steps, start)?.0,
+            None => task.measure(&ended.network, ended.steps, start)?.0,
         };
         let elapsed_secs = start.elapsed().as_secs_f64();
         Ok(TrainedOrientation {
@@ -142,8 +142,8 @@ struct OrientationTask<'a> {
     batches: &'a mut Batches<(), Vec<LabelledCrop>>,
     held_out: &'a [LabelledCrop],
     observe: &'a mut dyn FnMut(&OrientationEvent) -> ControlFlow<()>,
-    /// The last validation and the steps done before it.
-    last: Option<(usize, AngleErrors)>,
+    /// Errors of the network after the last step.
+    errors: Option<AngleErrors>,
 }
 
 impl OrientationTask<'_> {
@@ -204,9 +204,8 @@ impl Task for OrientationTask<'_> {
         start: Instant,
     ) -> Result<Validated, TrainingError> {
         let (errors, flow) = self.measure(&network, steps_done, start)?;
-        let reached = self.training.early_stop.filter(|early_stop| early_stop.is_reached(&errors));
-        self.last = Some((steps_done, errors));
-        Ok(Validated { cool_down: reached.map(|early_stop| early_stop.cool_down), flow })
+        self.errors = Some(errors);
+        Ok(Validated { cool_down: None, flow })
     }
 }
 
