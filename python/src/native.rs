@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
-use sdg_bindings::{CameraTeaching, Fault, FaultKind, RegionChoice, RotationalSymmetry, Teaching, View};
+use sdg_bindings::{CameraTeaching, RegionChoice, RotationalSymmetry, Teaching, View};
 use sdg_grasp::{SearchRegion, TeachOptions};
 
 use crate::array::picture;
@@ -121,7 +121,7 @@ impl Model {
 
 /// Parts tracked from frame to frame.
 #[pyclass(frozen)]
-struct Tracker(Mutex<Option<sdg_bindings::Tracker>>);
+struct Tracker(Mutex<sdg_bindings::Tracker>);
 
 #[pymethods]
 impl Tracker {
@@ -137,25 +137,22 @@ impl Tracker {
     ) -> PyResult<Self> {
         let view = view(camera, region, threads);
         let tracker = detached(py, || sdg_bindings::Tracker::new(&model.0, &view, search_frames))?;
-        Ok(Self(Mutex::new(Some(tracker))))
+        Ok(Self(Mutex::new(tracker)))
     }
 
     fn frame(&self, py: Python<'_>, array: &Bound<'_, PyAny>, channels: &str, captured_s: f64) -> PyResult<String> {
         let picture = picture(array, channels)?;
-        detached(py, || match self.tracker().as_mut() {
-            Some(tracker) => tracker.frame(picture, captured_s),
-            None => Err(Fault::new(FaultKind::Closed, "expected a tracker that is open, found one that was closed")),
-        })
+        detached(py, || self.tracker().frame(picture, captured_s))
     }
 
     /// Waits for a running search.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| *self.tracker() = None);
+        py.detach(|| self.tracker().close());
     }
 }
 
 impl Tracker {
-    fn tracker(&self) -> std::sync::MutexGuard<'_, Option<sdg_bindings::Tracker>> {
+    fn tracker(&self) -> std::sync::MutexGuard<'_, sdg_bindings::Tracker> {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }

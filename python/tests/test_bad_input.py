@@ -292,6 +292,11 @@ in_a_fork(lambda: [sdg.teach(sys.argv[2], sys.argv[3], model="S")])
 model.detect(picture)
 detect(None)
 detect(1)
+# Its search thread does not exist in a fork.
+tracker = sdg.Tracker(model)
+in_a_fork(lambda: tracker.frame(picture, captured_s=0.0))
+in_a_fork(lambda: tracker.close() or [])
+tracker.close()
 """
 
 
@@ -302,7 +307,8 @@ def test_a_forked_process_is_told_instead_of_waiting_for_ever(models: dict[str, 
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[1] == "found 1", lines
-    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3, 4)), lines
+    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3, 4, 5)), lines
+    assert lines[6] == "found 0", lines
 
 
 def test_every_exception_is_of_this_package() -> None:
