@@ -274,14 +274,11 @@ def teach(
     if grasp_height_mm is not None and camera is None:
         raise ArgumentError("expected camera with grasp_height_mm, found the height alone")
     if time_budget_s is not None and not 0 < _number("time_budget_s", time_budget_s) < 1e9:
-        raise ArgumentError(f"expected time_budget_s of more than 0 seconds, found {time_budget_s}")
+        raise ArgumentError(f"expected time_budget_s of more than 0 and less than 1e9 seconds, found {time_budget_s}")
     of_camera = None
     if camera is not None and mark_height_mm is not None:
-        mark_mm = _number("mark_height_mm", mark_height_mm)
-        grasp_mm = 0.5 * mark_mm if grasp_height_mm is None else _number("grasp_height_mm", grasp_height_mm)
-        for name, value in [("mark_height_mm", mark_mm), ("grasp_height_mm", grasp_mm)]:
-            if not (value == 0 or 0.1 <= value <= 500):
-                raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {value}: metres given as millimetres?")
+        mark_mm = _height_mm("mark_height_mm", mark_height_mm)
+        grasp_mm = 0.5 * mark_mm if grasp_height_mm is None else _height_mm("grasp_height_mm", grasp_height_mm)
         of_camera = (_path("camera", camera), 1e-3 * mark_mm, 1e-3 * grasp_mm)
     # 0 for full symmetry.
     turns = 0
@@ -442,6 +439,14 @@ def _number(name: str, value: Any, least: float = -inf, most: float = inf) -> fl
     if not least <= number <= most and (least, most) != (-inf, inf):
         raise ArgumentError(f"expected {name} from {least:g} to {most:g}, found {value}")
     return number
+
+
+def _height_mm(name: str, value: Any) -> float:
+    """A height above the table that was given; one below 0.1 mm was given in metres."""
+    height_mm = _number(name, value)
+    if not (height_mm == 0 or 0.1 <= height_mm <= 500):
+        raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {height_mm}: metres given as millimetres?")
+    return height_mm
 
 
 def _channels(channels: str) -> str:

@@ -212,6 +212,17 @@ def test_arguments_of_teach(arguments: dict[str, Any]) -> None:
         sdg.teach(**{"photo": made_pictures.PHOTO, "marks": made_pictures.MARKS, "model": "S", **arguments})
 
 
+def test_bounds_of_arguments_are_named_and_hold_for_given_values_only(tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {"photo": made_pictures.PHOTO, "marks": tmp_path / "missing", "model": "S"}
+    with pytest.raises(sdg.ArgumentError, match="of more than 0 and less than 1e9 seconds, found 2000000000.0"):
+        sdg.teach(**arguments, time_budget_s=2e9)
+    # The grasp's height is then half of this, 0.075 mm.
+    with pytest.raises(sdg.FileError, match="missing"):
+        sdg.teach(**arguments, camera=made_pictures.CAMERA, mark_height_mm=0.15)
+    with pytest.raises(sdg.ArgumentError, match="expected grasp_height_mm of 0 to 500 millimetres, found 0.075"):
+        sdg.teach(**arguments, camera=made_pictures.CAMERA, mark_height_mm=16, grasp_height_mm=0.075)
+
+
 def test_paths_and_objects_of_another_type(shape_model: sdg.GraspModel) -> None:
     anything: Any = "part.sdg"
     with pytest.raises(sdg.CameraError, match="expected an sdg.Camera .*, found str"):
