@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import re
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import inf
@@ -264,8 +265,9 @@ def teach(
     its size in the photo; with a calibrated camera, 0.9 to 1.11 times the part's size is searched instead. region:
     (left, upper, width, height) in pixels of the photo. camera: the file of the calibrated camera that took the photo,
     for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a
-    camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part.
-    more_demos: further photos of the part, each with its marks, like photo and marks.
+    camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part; a warning
+    names each one in which the model still accepts something. more_demos: further photos of the part, each with its
+    marks, like photo and marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """
@@ -311,7 +313,7 @@ def teach(
                 of_marks = _file_of(of_marks, Path(folder, str(number), f"{where}marks of {Path(of_photo).stem}.json"))
             demonstrations.append((of_photo, _path(f"{where}marks, a dictionary", of_marks)))
         try:
-            taught = _native.teach(
+            taught, accepted_negatives = _native.teach(
                 demonstrations,
                 model,
                 preset,
@@ -329,6 +331,8 @@ def teach(
                 raise
             # The caller does not know the files in this folder.
             raise type(error)(re.sub(rf"{re.escape(folder)}/\d+/(.*?)\.json", r"\1", str(error))) from None
+    for accepted in accepted_negatives:
+        warnings.warn(accepted, stacklevel=2)
     return GraspModel(taught)
 
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
-use sdg_bindings::{CameraTeaching, RegionChoice, RotationalSymmetry, Teaching, View};
+use sdg_bindings::{AcceptedNegative, CameraTeaching, RegionChoice, RotationalSymmetry, Teaching, View};
 use sdg_grasp::{SearchRegion, TeachOptions};
 
 use crate::array::picture;
@@ -157,7 +157,8 @@ impl Tracker {
     }
 }
 
-/// Teaches like `sdg teach`; lengths in metres; symmetry 0 means full.
+/// Teaches like `sdg teach`; lengths in metres; symmetry 0 means full. With the model, returns a text for each negative
+/// in which it still accepts something.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 fn teach(
@@ -173,7 +174,7 @@ fn teach(
     region: Option<(u32, u32, u32, u32)>,
     camera: Option<(PathBuf, f64, f64)>,
     negatives: Vec<PathBuf>,
-) -> PyResult<Model> {
+) -> PyResult<(Model, Vec<String>)> {
     let mut options = TeachOptions::new(seed);
     let refused = |error: sdg_grasp::GraspError| exception(py, error.into());
     options.kind = model.parse().map_err(|error| refused(sdg_grasp::GraspError::UnknownModel(error)))?;
@@ -204,10 +205,12 @@ fn teach(
             }
         })
     });
-    match signal {
-        Some(raised) => Err(raised),
-        None => taught.map(Model).map_err(|fault| exception(py, fault)),
+    if let Some(raised) = signal {
+        return Err(raised);
     }
+    let (model, accepted) = taught.map_err(|fault| exception(py, fault))?;
+    let told = |negative: &AcceptedNegative| format!("negative {}: {negative}", from.negatives[negative.idx].display());
+    Ok((Model(model), accepted.iter().map(told).collect()))
 }
 
 /// Figures of a model on labelled pictures, as JSON.

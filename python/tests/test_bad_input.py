@@ -1,5 +1,6 @@
 """Tests that wrong input raises an exception of a specific class, with the expected and the found value."""
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -263,6 +264,19 @@ def test_marks_that_nothing_can_be_taught_from() -> None:
             sdg.teach(made_pictures.PHOTO, marks, model="S")
     with pytest.raises(sdg.TeachingError):
         sdg.teach(made_pictures.PHOTO, made_pictures.DEMONSTRATIONS / "key" / "image.png", model="S")
+
+
+def test_a_negative_with_the_part_is_told(tmp_path: Path) -> None:
+    # The photo with one changed pixel: the photo itself is refused.
+    picture = sdg.read_picture(made_pictures.PHOTO).copy()
+    picture[0, 0] = 0
+    negative = tmp_path / "negative.png"
+    made_pictures.write_png(negative, picture)
+    with pytest.warns(UserWarning) as told:
+        sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, model="S", negatives=[negative])
+    [text] = [str(one.message) for one in told]
+    file = re.escape(str(negative))
+    assert re.fullmatch(rf"negative {file}: still accepted with [01]\.\d\d: does it show the part\?", text), text
 
 
 def test_trackers(shape_model: sdg.GraspModel) -> None:

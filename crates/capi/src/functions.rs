@@ -64,7 +64,8 @@ pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_ha
     let taught = || {
         // SAFETY: the caller meets the conditions of `# Safety`.
         let (from, options) = unsafe { teaching(from.as_ref().ok_or_else(|| null("from"))?)? };
-        let model = sdg_bindings::teach(&from, options, &mut |_| ControlFlow::Continue(()))?;
+        // No pictures without the part are given.
+        let (model, _) = sdg_bindings::teach(&from, options, &mut |_| ControlFlow::Continue(()))?;
         Ok(Object::Model(Arc::new(model)))
     };
     // SAFETY: the caller meets the conditions of `# Safety`.
