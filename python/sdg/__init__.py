@@ -350,6 +350,9 @@ def evaluate(
 
     report: a folder for a page with every picture; None for no page.
 
+    A warning says that all labels have one name which is not the model's part, and count as the part: `foreign_label` in
+    the figures.
+
     Raises TeachingError for invalid labels, and the exceptions of `GraspModel.detect`.
     """
     if label is not None and not isinstance(label, str):
@@ -366,6 +369,13 @@ def evaluate(
                 _number("min_score", min_score, 0, 1),
                 _path("report", unkept if report is None else report),
             )
+        )
+    if figures["foreign_label"] is not None:
+        part = figures["object"]
+        warnings.warn(
+            f"all labels are {figures['foreign_label']!r}, the model's part is {part!r}: they count as the part; "
+            f"label={part!r} counts the pictures as without it",
+            stacklevel=2,
         )
     if report is None:
         del figures["report"]
