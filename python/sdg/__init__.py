@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import re
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import inf
@@ -264,8 +265,9 @@ def teach(
     its size in the photo; with a calibrated camera, 0.9 to 1.11 times the part's size is searched instead. region:
     (left, upper, width, height) in pixels of the photo. camera: the file of the calibrated camera that took the photo,
     for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a
-    camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part.
-    more_demos: further photos of the part, each with its marks, like photo and marks.
+    camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part; a warning
+    names each one in which the model still accepts something. more_demos: further photos of the part, each with its
+    marks, like photo and marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """
@@ -274,14 +276,11 @@ def teach(
     if grasp_height_mm is not None and camera is None:
         raise ArgumentError("expected camera with grasp_height_mm, found the height alone")
     if time_budget_s is not None and not 0 < _number("time_budget_s", time_budget_s) < 1e9:
-        raise ArgumentError(f"expected time_budget_s of more than 0 seconds, found {time_budget_s}")
+        raise ArgumentError(f"expected time_budget_s of more than 0 and less than 1e9 seconds, found {time_budget_s}")
     of_camera = None
     if camera is not None and mark_height_mm is not None:
-        mark_mm = _number("mark_height_mm", mark_height_mm)
-        grasp_mm = 0.5 * mark_mm if grasp_height_mm is None else _number("grasp_height_mm", grasp_height_mm)
-        for name, value in [("mark_height_mm", mark_mm), ("grasp_height_mm", grasp_mm)]:
-            if not (value == 0 or 0.1 <= value <= 500):
-                raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {value}: metres given as millimetres?")
+        mark_mm = _height_mm("mark_height_mm", mark_height_mm)
+        grasp_mm = 0.5 * mark_mm if grasp_height_mm is None else _height_mm("grasp_height_mm", grasp_height_mm)
         of_camera = (_path("camera", camera), 1e-3 * mark_mm, 1e-3 * grasp_mm)
     # 0 for full symmetry.
     turns = 0
@@ -314,7 +313,7 @@ def teach(
                 of_marks = _file_of(of_marks, Path(folder, str(number), f"{where}marks of {Path(of_photo).stem}.json"))
             demonstrations.append((of_photo, _path(f"{where}marks, a dictionary", of_marks)))
         try:
-            taught = _native.teach(
+            taught, accepted_negatives = _native.teach(
                 demonstrations,
                 model,
                 preset,
@@ -332,6 +331,8 @@ def teach(
                 raise
             # The caller does not know the files in this folder.
             raise type(error)(re.sub(rf"{re.escape(folder)}/\d+/(.*?)\.json", r"\1", str(error))) from None
+    for accepted in accepted_negatives:
+        warnings.warn(accepted, stacklevel=2)
     return GraspModel(taught)
 
 
@@ -349,6 +350,9 @@ def evaluate(
 
     report: a folder for a page with every picture; None for no page.
 
+    A warning says that all labels have one name which is not the model's part, and count as the part: `foreign_label` in
+    the figures.
+
     Raises TeachingError for invalid labels, and the exceptions of `GraspModel.detect`.
     """
     if label is not None and not isinstance(label, str):
@@ -365,6 +369,13 @@ def evaluate(
                 _number("min_score", min_score, 0, 1),
                 _path("report", unkept if report is None else report),
             )
+        )
+    if figures["foreign_label"] is not None:
+        part = figures["object"]
+        warnings.warn(
+            f"all labels are {figures['foreign_label']!r}, the model's part is {part!r}: they count as the part; "
+            f"label={part!r} counts the pictures as without it",
+            stacklevel=2,
         )
     if report is None:
         del figures["report"]
@@ -442,6 +453,14 @@ def _number(name: str, value: Any, least: float = -inf, most: float = inf) -> fl
     if not least <= number <= most and (least, most) != (-inf, inf):
         raise ArgumentError(f"expected {name} from {least:g} to {most:g}, found {value}")
     return number
+
+
+def _height_mm(name: str, value: Any) -> float:
+    """A height above the table that was given; one below 0.1 mm was given in metres."""
+    height_mm = _number(name, value)
+    if not (height_mm == 0 or 0.1 <= height_mm <= 500):
+        raise ArgumentError(f"expected {name} of 0 to 500 millimetres, found {height_mm}: metres given as millimetres?")
+    return height_mm
 
 
 def _channels(channels: str) -> str:

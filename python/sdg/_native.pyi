@@ -71,7 +71,7 @@ def teach(
     region: Optional[_Bounds],
     camera: Optional[tuple[_Path, float, float]],
     negatives: list[_Path],
-) -> Model: ...
+) -> tuple[Model, list[str]]: ...
 def evaluate(
     model: Model,
     folder: _Path,

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
-use sdg_bindings::{CameraTeaching, Fault, FaultKind, RegionChoice, RotationalSymmetry, Teaching, View};
+use sdg_bindings::{AcceptedNegative, CameraTeaching, RegionChoice, RotationalSymmetry, Teaching, View};
 use sdg_grasp::{SearchRegion, TeachOptions};
 
 use crate::array::picture;
@@ -121,7 +121,7 @@ impl Model {
 
 /// Parts tracked from frame to frame.
 #[pyclass(frozen)]
-struct Tracker(Mutex<Option<sdg_bindings::Tracker>>);
+struct Tracker(Mutex<sdg_bindings::Tracker>);
 
 #[pymethods]
 impl Tracker {
@@ -137,30 +137,28 @@ impl Tracker {
     ) -> PyResult<Self> {
         let view = view(camera, region, threads);
         let tracker = detached(py, || sdg_bindings::Tracker::new(&model.0, &view, search_frames))?;
-        Ok(Self(Mutex::new(Some(tracker))))
+        Ok(Self(Mutex::new(tracker)))
     }
 
     fn frame(&self, py: Python<'_>, array: &Bound<'_, PyAny>, channels: &str, captured_s: f64) -> PyResult<String> {
         let picture = picture(array, channels)?;
-        detached(py, || match self.tracker().as_mut() {
-            Some(tracker) => tracker.frame(picture, captured_s),
-            None => Err(Fault::new(FaultKind::Closed, "expected a tracker that is open, found one that was closed")),
-        })
+        detached(py, || self.tracker().frame(picture, captured_s))
     }
 
     /// Waits for a running search.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| *self.tracker() = None);
+        py.detach(|| self.tracker().close());
     }
 }
 
 impl Tracker {
-    fn tracker(&self) -> std::sync::MutexGuard<'_, Option<sdg_bindings::Tracker>> {
+    fn tracker(&self) -> std::sync::MutexGuard<'_, sdg_bindings::Tracker> {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }
 
-/// Teaches like `sdg teach`; lengths in metres; symmetry 0 means full.
+/// Teaches like `sdg teach`; lengths in metres; symmetry 0 means full. With the model, returns a text for each negative
+/// in which it still accepts something.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 fn teach(
@@ -176,7 +174,7 @@ fn teach(
     region: Option<(u32, u32, u32, u32)>,
     camera: Option<(PathBuf, f64, f64)>,
     negatives: Vec<PathBuf>,
-) -> PyResult<Model> {
+) -> PyResult<(Model, Vec<String>)> {
     let mut options = TeachOptions::new(seed);
     let refused = |error: sdg_grasp::GraspError| exception(py, error.into());
     options.kind = model.parse().map_err(|error| refused(sdg_grasp::GraspError::UnknownModel(error)))?;
@@ -207,10 +205,12 @@ fn teach(
             }
         })
     });
-    match signal {
-        Some(raised) => Err(raised),
-        None => taught.map(Model).map_err(|fault| exception(py, fault)),
+    if let Some(raised) = signal {
+        return Err(raised);
     }
+    let (model, accepted) = taught.map_err(|fault| exception(py, fault))?;
+    let told = |negative: &AcceptedNegative| format!("negative {}: {negative}", from.negatives[negative.idx].display());
+    Ok((Model(model), accepted.iter().map(told).collect()))
 }
 
 /// Figures of a model on labelled pictures, as JSON.

@@ -1,5 +1,6 @@
 """Tests that wrong input raises an exception of a specific class, with the expected and the found value."""
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -212,6 +213,17 @@ def test_arguments_of_teach(arguments: dict[str, Any]) -> None:
         sdg.teach(**{"photo": made_pictures.PHOTO, "marks": made_pictures.MARKS, "model": "S", **arguments})
 
 
+def test_bounds_of_arguments_are_named_and_hold_for_given_values_only(tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {"photo": made_pictures.PHOTO, "marks": tmp_path / "missing", "model": "S"}
+    with pytest.raises(sdg.ArgumentError, match="of more than 0 and less than 1e9 seconds, found 2000000000.0"):
+        sdg.teach(**arguments, time_budget_s=2e9)
+    # The grasp's height is then half of this, 0.075 mm.
+    with pytest.raises(sdg.FileError, match="missing"):
+        sdg.teach(**arguments, camera=made_pictures.CAMERA, mark_height_mm=0.15)
+    with pytest.raises(sdg.ArgumentError, match="expected grasp_height_mm of 0 to 500 millimetres, found 0.075"):
+        sdg.teach(**arguments, camera=made_pictures.CAMERA, mark_height_mm=16, grasp_height_mm=0.075)
+
+
 def test_paths_and_objects_of_another_type(shape_model: sdg.GraspModel) -> None:
     anything: Any = "part.sdg"
     with pytest.raises(sdg.CameraError, match="expected an sdg.Camera .*, found str"):
@@ -254,6 +266,19 @@ def test_marks_that_nothing_can_be_taught_from() -> None:
         sdg.teach(made_pictures.PHOTO, made_pictures.DEMONSTRATIONS / "key" / "image.png", model="S")
 
 
+def test_a_negative_with_the_part_is_told(tmp_path: Path) -> None:
+    # The photo with one changed pixel: the photo itself is refused.
+    picture = sdg.read_picture(made_pictures.PHOTO).copy()
+    picture[0, 0] = 0
+    negative = tmp_path / "negative.png"
+    made_pictures.write_png(negative, picture)
+    with pytest.warns(UserWarning) as told:
+        sdg.teach(made_pictures.PHOTO, made_pictures.MARKS, model="S", negatives=[negative])
+    [text] = [str(one.message) for one in told]
+    file = re.escape(str(negative))
+    assert re.fullmatch(rf"negative {file}: still accepted with [01]\.\d\d: does it show the part\?", text), text
+
+
 def test_trackers(shape_model: sdg.GraspModel) -> None:
     tracker = sdg.Tracker(shape_model)
     tracker.frame(GREY, captured_s=1.0)
@@ -292,6 +317,11 @@ in_a_fork(lambda: [sdg.teach(sys.argv[2], sys.argv[3], model="S")])
 model.detect(picture)
 detect(None)
 detect(1)
+# Its search thread does not exist in a fork.
+tracker = sdg.Tracker(model)
+in_a_fork(lambda: tracker.frame(picture, captured_s=0.0))
+in_a_fork(lambda: tracker.close() or [])
+tracker.close()
 """
 
 
@@ -302,7 +332,8 @@ def test_a_forked_process_is_told_instead_of_waiting_for_ever(models: dict[str, 
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[1] == "found 1", lines
-    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3, 4)), lines
+    assert all("expected a new process (spawn)" in lines[k] for k in (0, 2, 3, 4, 5)), lines
+    assert lines[6] == "found 0", lines
 
 
 def test_every_exception_is_of_this_package() -> None:

@@ -232,6 +232,19 @@ def test_evaluation_counts_as_the_program_does(
         assert as_printed(without_seconds(figures[key])) == without_seconds(of_program[key]), key
 
 
+def test_labels_of_another_part_are_told(
+    shape_model: sdg.GraspModel, pictures: dict[str, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "noisy.png").write_bytes(pictures["noisy"].read_bytes())
+    marks = made_pictures.MARKS.read_text().replace(f'"label": "{made_pictures.PART}"', '"label": "bolt"')
+    (tmp_path / "noisy.json").write_text(marks)
+    with pytest.warns(UserWarning, match="all labels are 'bolt', the model's part is 'pendulum': they count as the part"):
+        figures = sdg.evaluate(shape_model, tmp_path)
+    assert (figures["foreign_label"], figures["parts"]) == ("bolt", 1)
+    figures = sdg.evaluate(shape_model, tmp_path, label=made_pictures.PART)
+    assert (figures["foreign_label"], figures["parts"]) == (None, 0)
+
+
 def without_seconds(value: Any) -> Any:
     if isinstance(value, list):
         return [without_seconds(one) for one in value]

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use sdg_cell::CellError;
-use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, LeftOut, Tested, page, to_json};
-use sdg_grasp::{GraspError, Verification};
+use sdg_evaluation::NoProgress;
+use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, TestedFolder, page, to_json};
+use sdg_grasp::Verification;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::model::{Model, View};
@@ -30,21 +30,11 @@ pub fn evaluate(
     let verification = Verification::ByShape;
     on_threads(view.threads, || {
         let perception = model.perception(view.camera.as_ref(), view.region)?;
-        let mut labelled =
+        let labelled =
             LabelledFolder::read(folder, &perception, label).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
         sdg_files::prepare_folder(report)?;
-        let mut tested = Vec::new();
-        for picture in labelled.pictures {
-            let file = picture.name();
-            match Tested::detect(picture, &perception, verification) {
-                Ok(of_picture) => tested.push(of_picture),
-                // The model's region does not fit a picture of this size.
-                Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
-                    labelled.left_out.push(LeftOut { file, why: error.root_cause().to_string() });
-                }
-                Err(error) => return Err(error.into()),
-            }
-        }
+        let TestedFolder { tested, left_out, others, foreign_label } =
+            labelled.test(&perception, verification, min_score, &NoProgress)?;
         let evaluated = Evaluated {
             folder,
             // The model may not come from a file.
@@ -53,8 +43,9 @@ pub fn evaluate(
             verification,
             min_score,
             tested,
-            left_out: labelled.left_out,
-            others: labelled.others,
+            left_out,
+            others,
+            foreign_label,
         };
         let page = page(&evaluated, "sdg.evaluate (Python)")?.write(report).map_err(anyhow::Error::from)?;
         Ok(to_json(&evaluated, &page).to_string())

@@ -42,7 +42,7 @@ pub use picture::{PixelOrder, PixelShape, read_picture};
 pub use sdg_calibration::Frame;
 pub use sdg_cell::{DEFAULT_MIN_SCORE, FoundRecord, PoseRecord};
 pub use sdg_geometry::RotationalSymmetry;
-pub use sdg_grasp::{Contributions, DetectionRecord, GraspRecord, TeachOptions, TurnSource};
+pub use sdg_grasp::{AcceptedNegative, Contributions, DetectionRecord, GraspRecord, TeachOptions, TurnSource};
 pub use teaching::{CameraTeaching, Teaching, teach};
 pub use threads::on_threads;
 pub use tracker::Tracker;

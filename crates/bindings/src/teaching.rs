@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use sdg_evaluation::TaughtFile;
-use sdg_grasp::{SearchRegion, TeachOptions, TeachingEvent};
+use sdg_grasp::{AcceptedNegative, SearchRegion, TeachOptions, TeachingEvent};
 use sdg_inputs::TeachingFiles;
 
 use crate::fault::{Fault, FaultKind, Result};
@@ -34,7 +34,8 @@ pub struct Teaching {
 }
 
 /// Teaches like `sdg teach`; `observe` may end teaching early. The returned model is read back from its file's bytes,
-/// so its weights are rounded.
+/// so its weights are rounded. Pictures without the part in which the model still accepts something are returned with
+/// it.
 ///
 /// # Errors
 /// Files cannot be read, photos or marks are unsuitable for teaching, the region is empty, the process was forked from
@@ -43,7 +44,7 @@ pub fn teach(
     from: &Teaching,
     mut options: TeachOptions,
     observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
-) -> Result<Model> {
+) -> Result<(Model, Vec<AcceptedNegative>)> {
     let heights = |camera: &CameraTeaching| [camera.mark_height_m, camera.grasp_height_m];
     let files = TeachingFiles {
         demonstrations: &from.demonstrations,
@@ -55,5 +56,6 @@ pub fn teach(
     }
     check_thread_per_core()?;
     let demonstrations = files.read(&mut options).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
-    Ok(TaughtFile::teach(&demonstrations, &options, observe)?.model.into())
+    let TaughtFile { taught, model, .. } = TaughtFile::teach(&demonstrations, &options, observe)?;
+    Ok((model.into(), taught.accepted_negatives))
 }

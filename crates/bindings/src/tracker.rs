@@ -1,5 +1,7 @@
 //! Parts tracked from frame to frame.
 
+use std::mem;
+use std::process;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,7 +16,10 @@ use crate::threads::on_threads;
 /// A tracker for one camera's frames; searches run on a separate thread, or on the caller's with `search_frames`.
 pub struct Tracker {
     perception: Arc<Perception>,
-    tracker: LiveTracker,
+    /// `None` after the tracker was closed.
+    tracker: Option<LiveTracker>,
+    /// Id of the process that has the search thread.
+    pid: u32,
     threads: Option<usize>,
     last_secs: f64,
 }
@@ -31,16 +36,19 @@ impl Tracker {
         let as_it_takes = SearchTime::AsItTakes { threads: view.threads };
         let search_time = search_frames.map_or(as_it_takes, SearchTime::Frames);
         let tracker = LiveTracker::new(&perception, TrackerConfig::DEFAULT, search_time)?;
-        Ok(Self { perception, tracker, threads: view.threads, last_secs: 0.0 })
+        Ok(Self { perception, tracker: Some(tracker), pid: process::id(), threads: view.threads, last_secs: 0.0 })
     }
 
     /// The parts in a frame as JSON, with the fields of `sdg detect --from --json`; `captured_secs` is measured from
     /// any fixed time.
     ///
     /// # Errors
-    /// The time is before that of the last frame, the picture's size differs from the camera's, or the region is not
+    /// The tracker was closed; the time is before that of the last frame, the picture's size differs from the camera's, or the region is not
     /// inside the picture; a search fails; the errors of threads as for [`Model::detect`].
     pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
+        let Some(tracker) = self.tracker.as_mut() else {
+            return Err(Fault::new(FaultKind::Closed, "expected a tracker that is open, found one that was closed"));
+        };
         let Some(captured) =
             Duration::try_from_secs_f64(captured_secs).ok().filter(|_| captured_secs >= self.last_secs)
         else {
@@ -53,7 +61,6 @@ impl Tracker {
             ));
         };
         self.perception.check_picture(&picture)?;
-        let tracker = &mut self.tracker;
         let parts = on_threads(self.threads, || tracker.frame(Arc::new(picture), captured))??;
         self.last_secs = captured_secs;
         let detections: Vec<&GraspDetection> = parts.iter().map(|part| &part.detection).collect();
@@ -67,5 +74,20 @@ impl Tracker {
         };
         let records: Vec<PartRecord> = parts.into_iter().zip(touched).map(record).collect();
         Ok(serde_json::to_string(&records).unwrap_or_default())
+    }
+
+    /// Closes the tracker; waits for a running search.
+    pub fn close(&mut self) {
+        let tracker = self.tracker.take();
+        if self.pid != process::id() {
+            // The search thread does not exist in a forked process, so waiting for its end would fail.
+            mem::forget(tracker);
+        }
+    }
+}
+
+impl Drop for Tracker {
+    fn drop(&mut self) {
+        self.close();
     }
 }

@@ -298,11 +298,12 @@ sdg_status sdg_detections_get(sdg_handle detections, size_t idx, sdg_detection *
 /* Gives the best accepted detection; SDG_ERROR_NOTHING_TO_GRASP if there is none. */
 sdg_status sdg_detections_best(sdg_handle detections, sdg_detection *found);
 
-/* Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon. */
+/* Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon. numbers may be
+ * NULL if nothing is copied. */
 sdg_status sdg_detections_polygon(sdg_handle detections, size_t idx, double *numbers, size_t max_points);
 
 /* Copies x and y in pixels and the network's score of each keypoint, at most max_points of the detection's
- * num_keypoints. */
+ * num_keypoints. numbers may be NULL if nothing is copied. */
 sdg_status sdg_detections_keypoints(sdg_handle detections, size_t idx, double *numbers, size_t max_points);
 
 /* Copies all detections to buffer, in the same way as sdg_last_error: the array of `sdg detect --json`, with unrounded

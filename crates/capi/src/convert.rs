@@ -197,15 +197,19 @@ fn evidence(found: Option<&Contributions>) -> sdg_evidence {
     }
 }
 
-/// Copies as many rows of numbers as fit.
+/// Copies as many rows of numbers as fit. Null is an error only if there is something to copy: a caller may have no
+/// array for no rows.
 ///
 /// # Safety
 /// `out` is null or writable for `max_rows` rows of `N` numbers.
 pub unsafe fn copy_rows<const N: usize>(rows: &[[f64; N]], out: *mut f64, max_rows: usize) -> Result<()> {
+    let copied = rows[..rows.len().min(max_rows)].as_flattened();
+    if copied.is_empty() {
+        return Ok(());
+    }
     if out.is_null() {
         return Err(null("numbers"));
     }
-    let copied = rows[..rows.len().min(max_rows)].as_flattened();
     // SAFETY: not null, the caller promises the room, and `rows` is Rust's own memory.
     unsafe { std::ptr::copy_nonoverlapping(copied.as_ptr(), out, copied.len()) };
     Ok(())

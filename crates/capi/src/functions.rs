@@ -64,7 +64,8 @@ pub unsafe extern "C" fn sdg_teach(from: *const sdg_teaching, model: *mut sdg_ha
     let taught = || {
         // SAFETY: the caller meets the conditions of `# Safety`.
         let (from, options) = unsafe { teaching(from.as_ref().ok_or_else(|| null("from"))?)? };
-        let model = sdg_bindings::teach(&from, options, &mut |_| ControlFlow::Continue(()))?;
+        // No pictures without the part are given.
+        let (model, _) = sdg_bindings::teach(&from, options, &mut |_| ControlFlow::Continue(()))?;
         Ok(Object::Model(Arc::new(model)))
     };
     // SAFETY: the caller meets the conditions of `# Safety`.
@@ -141,7 +142,8 @@ pub unsafe extern "C" fn sdg_detections_best(detections: sdg_handle, found: *mut
     status(|| unsafe { write(found, "found", detection(handles::detections(detections)?.best()?)) })
 }
 
-/// Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon.
+/// Copies x and y of the outline's corners in pixels, at most max_points of the detection's num_polygon. numbers may be
+/// NULL if nothing is copied.
 ///
 /// # Safety
 /// `numbers` is null or writable for `2 * max_points` numbers.
@@ -162,7 +164,7 @@ pub unsafe extern "C" fn sdg_detections_polygon(
 }
 
 /// Copies x and y in pixels and the network's score of each keypoint, at most max_points of the detection's
-/// num_keypoints.
+/// num_keypoints. numbers may be NULL if nothing is copied.
 ///
 /// # Safety
 /// `numbers` is null or writable for `3 * max_points` numbers.

@@ -82,6 +82,9 @@ int main(int argc, char **argv) {
     report("best_null", sdg_detections_best(detections, NULL));
     report("idx", sdg_detections_get(detections, 1000, &found));
     report("polygon_null", sdg_detections_polygon(detections, 0, NULL, 5));
+    report("polygon_null_for_none", sdg_detections_polygon(detections, 0, NULL, 0));
+    /* Model S has no keypoints, so a program may have no array for them. */
+    report("keypoints_null_for_none", sdg_detections_keypoints(detections, 0, NULL, found.num_keypoints));
     report("free_detections", sdg_free(detections));
     report("best_freed", sdg_detections_best(detections, &found));
     report("free_twice", sdg_free(detections));

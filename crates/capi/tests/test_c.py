@@ -178,6 +178,8 @@ BAD_INPUT = {
     "best_null": (1, "expected a pointer as found, found NULL"),
     "idx": (1, "found 1000"),
     "polygon_null": (1, "expected a pointer as numbers, found NULL"),
+    "polygon_null_for_none": (0, ""),
+    "keypoints_null_for_none": (0, ""),
     "free_detections": (0, ""),
     "best_freed": (9, "which was freed"),
     "free_twice": (9, "which was freed"),

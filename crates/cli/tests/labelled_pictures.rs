@@ -394,10 +394,13 @@ fn labels_of_another_part_are_told_and_can_be_left_out() {
     let pictures = case.folder.path();
     // Another picture than the photo from which the model was taught.
     image::open(pictures.join("a.png")).unwrap().rotate180().save(pictures.join("a.png")).unwrap();
-    let evaluated =
-        sdg(&["evaluate", "--pictures", text(pictures), "--grasp-model", text(&model), "--report", text(&report)]);
+    let arguments = ["--pictures", text(pictures), "--grasp-model", text(&model), "--report", text(&report)];
+    let evaluated = sdg(&[&["evaluate", "--json"][..], &arguments].concat());
     let stderr = String::from_utf8(evaluated.stderr).unwrap();
     assert!(stderr.contains("all labels are `bolt`, the model's part is `pendulum`"), "{stderr}");
+    let counted: Value = serde_json::from_slice(&evaluated.stdout).unwrap();
+    assert_eq!(counted["foreign_label"], json!("bolt"));
     let told = evaluate(pictures, &model, &report, &["--label", "pendulum"]);
     assert_eq!((&told["pictures_without_part"], &told["other_labels"]), (&json!(1), &json!(1)));
+    assert_eq!(told["foreign_label"], json!(null));
 }

@@ -64,7 +64,7 @@ pub use machine::machine;
 pub use motion_drawing::{draw_dry_run, draw_motions};
 #[cfg(feature = "simulation")]
 pub use own_part::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
-pub use progress::Progress;
+pub use progress::{NoProgress, Progress};
 #[cfg(feature = "simulation")]
 pub use run_words::{attempt_in_words, run_json};
 pub use shell_word::quoted;

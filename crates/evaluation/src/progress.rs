@@ -11,3 +11,12 @@ pub trait Progress: Sync {
     /// Prints a separate line.
     fn print_line(&self, text: &str);
 }
+
+/// Progress that is not shown.
+pub struct NoProgress;
+
+impl Progress for NoProgress {
+    fn expect(&self, _units: usize) {}
+    fn unit_done(&self, _what: &str) {}
+    fn print_line(&self, _text: &str) {}
+}

@@ -1,44 +1,77 @@
 // The camera: the next frame is taken when the model has searched the last one.
 
 export class Camera {
-  #stream = null;
   #video = document.createElement("video");
+  #run = null; // An object for each start; a start that finds another one here, or none, was stopped.
 
+  /** Whether the camera was started and not stopped; it may still be opening. */
   get running() {
-    return this.#stream !== null;
+    return this.#run !== null;
   }
 
-  /** Opens the camera, preferably the one on the back, and calls `onFrame` with each bitmap. */
+  /**
+   * Opens the camera, preferably the one on the back, and calls `onFrame` with each bitmap until `stop`, after which no
+   * error is thrown. Throws if the camera cannot be used or is lost, and the errors of `onFrame`.
+   */
   async start(onFrame) {
-    if (!navigator.mediaDevices?.getUserMedia) {
-      throw new Error("browsers provide a camera only to pages served by https or from this machine (localhost)");
-    }
-    const wanted = { facingMode: "environment", width: { ideal: 1280 }, height: { ideal: 720 } };
-    this.#stream = await navigator.mediaDevices.getUserMedia({ video: wanted, audio: false }).catch((error) => {
-      throw new Error(cameraRefused(error));
-    });
-    this.#video.srcObject = this.#stream;
-    this.#video.muted = true;
-    this.#video.playsInline = true;
-    await this.#video.play();
-    this.#run(onFrame);
-  }
-
-  stop() {
-    this.#stream?.getTracks().forEach((track) => track.stop());
-    this.#stream = null;
-    this.#video.srcObject = null;
-  }
-
-  async #run(onFrame) {
-    const stream = this.#stream;
-    while (this.#stream === stream) {
-      await new Promise(requestAnimationFrame);
-      if (this.#video.readyState >= HTMLMediaElement.HAVE_CURRENT_DATA && this.#stream === stream) {
-        await onFrame(await createImageBitmap(this.#video));
+    const run = (this.#run = {});
+    try {
+      const stream = await openedCamera();
+      if (run !== this.#run) {
+        stopTracks(stream);
+        return;
+      }
+      this.#video.srcObject = stream;
+      this.#video.muted = true;
+      this.#video.playsInline = true;
+      await this.#video.play();
+      await this.#takeFrames(run, stream, onFrame);
+    } catch (error) {
+      if (run === this.#run) {
+        throw error;
       }
     }
   }
+
+  stop() {
+    this.#run = null;
+    stopTracks(this.#video.srcObject);
+    this.#video.srcObject = null;
+  }
+
+  async #takeFrames(run, stream, onFrame) {
+    const [track] = stream.getVideoTracks();
+    for (;;) {
+      await new Promise(requestAnimationFrame);
+      if (run !== this.#run) {
+        return;
+      }
+      if (track.readyState === "ended") {
+        throw new Error("the camera was unplugged, or access to it was withdrawn"); // The video keeps its last frame.
+      }
+      if (this.#video.readyState >= HTMLMediaElement.HAVE_CURRENT_DATA) {
+        const bitmap = await createImageBitmap(this.#video);
+        if (run !== this.#run) {
+          return;
+        }
+        await onFrame(bitmap);
+      }
+    }
+  }
+}
+
+async function openedCamera() {
+  if (!navigator.mediaDevices?.getUserMedia) {
+    throw new Error("browsers provide a camera only to pages served by https or from this machine (localhost)");
+  }
+  const wanted = { facingMode: "environment", width: { ideal: 1280 }, height: { ideal: 720 } };
+  return navigator.mediaDevices.getUserMedia({ video: wanted, audio: false }).catch((error) => {
+    throw new Error(cameraRefused(error));
+  });
+}
+
+function stopTracks(stream) {
+  stream?.getTracks().forEach((track) => track.stop());
 }
 
 function cameraRefused(error) {

@@ -1,84 +1,87 @@
-// The page's interface to the worker: a promise for each request, and a new worker if one stopped. If a worker cannot be
-// started, each request gets the reason.
+// The page's interface to the worker: a promise for each request. A request is sent when the one before is answered, so
+// that a worker that stops leaves only one unanswered. The next request starts another worker, also if none was started.
 
 export class Detector {
-  #device;
   #worker = null;
-  #model = null; // The open model's bytes, for a worker that has to be started again.
-  #notStarted = null; // Why the worker could not be started.
-  #waiting = new Map();
-  #nextId = 1;
+  #model = null; // The open model's bytes, for another worker.
+  #hasModel = false; // Whether the worker has opened them.
+  #closed = false;
+  #last = Promise.resolve(); // Ends with the last request.
+  #pending = null; // {resolve, reject} of the message that was sent last.
 
   /** Starts a worker on the processor, or on the graphics card through WebGPU. */
   constructor(device = "processor") {
-    this.#device = device;
-    this.#start();
+    this.device = device;
+    this.#start(); // The module is loaded before the first request.
   }
 
   /** Ends the worker; pending requests get an error. */
   close() {
-    this.#fail("the model was closed");
+    this.#closed = true;
+    this.#stop("the model was closed");
   }
 
-  /** Opens a grasp model and returns its metadata. The bytes stay in the page. */
-  async open(bytes) {
-    const { summary } = await this.#ask({ open: bytes });
-    this.#model = bytes;
-    return summary;
+  /** Opens a grasp model and returns its metadata; after an error, the model before stays open. The bytes stay here. */
+  open(bytes) {
+    return this.#inTurn(async () => {
+      const { summary } = await this.#send({ open: bytes });
+      this.#model = bytes;
+      this.#hasModel = true;
+      return summary;
+    });
   }
 
   /** Detects in a file, or in an `ImageBitmap`, whose ownership is transferred: `{record, milliseconds, decoded}`. */
   look(image, verify) {
-    return this.#ask({ look: image, verify }, image instanceof ImageBitmap ? [image] : []);
-  }
-
-  #start() {
-    this.#worker = new Worker(new URL(`./worker.js?device=${this.#device}`, import.meta.url), { type: "module" });
-    this.#worker.onmessage = ({ data }) => this.#receive(data);
-    this.#worker.onerror = (event) => {
-      event.preventDefault();
-      this.#notStarted = event.message || "the worker could not be started";
-      this.#fail(this.#notStarted);
-    };
-  }
-
-  #ask(request, transfer = []) {
-    if (this.#notStarted) {
-      return Promise.reject(new Error(this.#notStarted));
-    }
-    const id = this.#nextId++;
-    return new Promise((resolve, reject) => {
-      this.#waiting.set(id, { resolve, reject });
-      this.#worker.postMessage({ id, ...request }, transfer);
+    return this.#inTurn(async () => {
+      if (this.#model && !this.#hasModel) {
+        await this.#send({ open: this.#model });
+        this.#hasModel = true;
+      }
+      return this.#send({ look: image, verify }, image instanceof ImageBitmap ? [image] : []);
     });
   }
 
-  #receive({ id, error, stopped, ...result }) {
-    const waiting = this.#waiting.get(id);
-    this.#waiting.delete(id);
-    if (error) {
-      waiting?.reject(new Error(error));
-    } else {
-      waiting?.resolve(result);
-    }
-    if (stopped) {
-      this.#startAgain("the model had to be restarted");
-    }
+  #inTurn(work) {
+    const done = this.#last.then(work);
+    this.#last = done.catch(() => {});
+    return done;
   }
 
-  #fail(reason) {
-    this.#worker.terminate();
-    const lost = [...this.#waiting.values()];
-    this.#waiting.clear();
-    lost.forEach(({ reject }) => reject(new Error(reason)));
+  #send(message, transfer = []) {
+    if (this.#closed) {
+      throw new Error("the model was closed");
+    }
+    if (!this.#worker) {
+      this.#start();
+    }
+    return new Promise((resolve, reject) => {
+      this.#pending = { resolve, reject };
+      this.#worker.postMessage(message, transfer);
+    });
   }
 
-  #startAgain(reason) {
-    this.#fail(reason);
-    this.#start();
-    if (this.#model) {
-      // A model with which the worker stops again is not opened forever.
-      this.#ask({ open: this.#model }).catch(() => (this.#model = null));
-    }
+  #start() {
+    this.#worker = new Worker(new URL(`./worker.js?device=${this.device}`, import.meta.url), { type: "module" });
+    this.#worker.onmessage = ({ data: { error, stopped, ...result } }) => {
+      if (stopped) {
+        this.#stop(error);
+      } else if (error !== undefined) {
+        this.#pending.reject(new Error(error));
+      } else {
+        this.#pending.resolve(result);
+      }
+    };
+    this.#worker.onerror = (event) => {
+      event.preventDefault();
+      this.#stop(event.message || "the worker could not be started");
+    };
+  }
+
+  #stop(reason) {
+    this.#worker?.terminate();
+    this.#worker = null;
+    this.#hasModel = false;
+    this.#pending?.reject(new Error(reason));
   }
 }

@@ -12,10 +12,11 @@ const WIDEST_SHOWN = 2048;
 
 const camera = new Camera();
 const pictures = []; // {file, bitmap, result: {record, milliseconds, decoded}, error, button, small}
-let detector = null;
-let modelFile = null; // The file that is open.
-let modelOpen = false;
-let current = null; // A picture of the list, or the camera's last frame.
+let detector = null; // On the device chosen last; outcomes of another one are ignored.
+let opening = null; // The model file chosen last, until it is open or refused.
+let modelFile = null; // The file that was opened last.
+let modelOpen = false; // Whether it is open in `detector`.
+let current = null; // A picture of the list, or the camera's last frame, which has no file.
 let generation = 0; // Increases when model or settings change, which makes earlier requests invalid.
 
 const missing = missingSupport();
@@ -29,8 +30,13 @@ if (missing) {
 }
 
 function wire() {
-  element("model-file").onchange = ({ target }) => openModel(target.files[0]).finally(() => (target.value = ""));
+  element("model-file").onchange = ({ target }) => {
+    complain(null);
+    openModel(target.files[0]);
+    target.value = "";
+  };
   element("image-files").onchange = ({ target }) => {
+    complain(null);
     addPictures([...target.files]);
     target.value = "";
   };
@@ -38,7 +44,10 @@ function wire() {
   element("verify").onchange = detectInAllAgain;
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
-  element("webgpu").onchange = () => changeDevice();
+  element("webgpu").onchange = () => {
+    complain(null);
+    changeDevice();
+  };
   element("webgpu-choice").hidden = !navigator.gpu; // Browsers offer WebGPU only to pages served by https or from this machine.
   watchWidth(element("stage"), showCurrent);
 
@@ -51,6 +60,7 @@ function wire() {
   addEventListener("drop", async (event) => {
     event.preventDefault();
     dropping(-depth);
+    complain(null);
     const files = [...event.dataTransfer.files];
     const isModel = (file) => /\.(sdg|safetensors)$/i.test(file.name);
     const model = files.find(isModel);
@@ -72,47 +82,73 @@ function watchWidth(watched, redraw) {
   });
 }
 
-/** Uses the open model on the other device; if that fails, switches back. */
-async function changeDevice(opened = modelOpen ? modelFile : null) {
-  stopCamera();
-  if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
-    element("webgpu").checked = false;
+const chosenDevice = () => (element("webgpu").checked ? "webgpu" : "processor");
+
+/**
+ * Opens the model chosen last on the device chosen last; if that model is refused, the one before. If the graphics card
+ * opens none, switches back with the model `notOnCard`.
+ */
+async function changeDevice(notOnCard = null) {
+  const card = element("webgpu");
+  if (card.checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
+    card.checked = false;
     complain("This browser provides no graphics card to the page; the processor is used.");
+  }
+  // Another choice may have been made meanwhile.
+  if (chosenDevice() === detector.device) {
     return;
   }
-  generation += 1; // Results of the old worker are ignored.
-  pictures.forEach(({ small }) => (small.textContent = waitingText()));
-  modelOpen = false;
+  stopCamera();
   detector.close();
-  detector = new Detector(element("webgpu").checked ? "webgpu" : "processor");
-  if (opened && !(await openModel(opened)) && element("webgpu").checked) {
+  const mine = (detector = new Detector(chosenDevice()));
+  modelOpen = false;
+  detectInAllAgain();
+  const files = [...new Set([opening, notOnCard, modelFile])].filter(Boolean);
+  for (const file of files) {
+    if (mine === detector && !modelOpen) {
+      await openModel(file);
+    }
+  }
+  if (files.length > 0 && mine === detector && !modelOpen && card.checked) {
     const complaint = element("alert").textContent;
-    element("webgpu").checked = false;
-    await changeDevice(opened);
-    complain(`The graphics card cannot be used, the processor is. ${complaint}`);
+    card.checked = false;
+    await changeDevice(files[0]);
+    if (modelOpen) {
+      complain(`The graphics card cannot be used, the processor is. ${complaint}`);
+    }
   }
 }
 
-/** Opens a model and searches every picture with it; returns whether it could be opened. */
+/** Opens a model and searches every picture with it; if it is refused, the model before stays open. */
 async function openModel(file) {
   if (!file) {
-    return false;
+    return;
   }
-  complain(null);
+  const mine = detector;
+  opening = file;
   say(`Opening ${file.name}…`);
+  let summary = null;
+  let refused = null;
   try {
-    const summary = await detector.open(await file.arrayBuffer());
-    modelOpen = true;
-    modelFile = file;
-    showModel(file.name, summary);
-    say("");
-    detectInAllAgain();
-    return true;
+    summary = await mine.open(await file.arrayBuffer());
   } catch (error) {
-    say("");
-    complain(`${file.name}: ${error.message}`);
-    return false;
+    refused = `${file.name}: ${error.message}`;
   }
+  if (mine !== detector) {
+    return; // `changeDevice` opens it on the other device.
+  }
+  if (opening === file) {
+    opening = null;
+  }
+  if (refused) {
+    complain(refused);
+    showCurrent();
+    return;
+  }
+  modelOpen = true;
+  modelFile = file;
+  showModel(file.name, summary);
+  detectInAllAgain();
 }
 
 function showModel(name, { model, preset, object, teaching }) {
@@ -137,10 +173,6 @@ function showModel(name, { model, preset, object, teaching }) {
 const waitingText = () => (modelOpen ? "waiting" : "waiting for a model");
 
 function addPictures(files) {
-  if (files.length) {
-    complain(null);
-    stopCamera();
-  }
   const added = files.map((file) => {
     const picture = { file, bitmap: null, result: null, error: null };
     picture.button = document.createElement("button");
@@ -176,33 +208,30 @@ async function detectInAll(some) {
 
 function detectInAllAgain() {
   generation += 1;
+  const all = current && !current.file ? [current, ...pictures] : [...pictures];
   // Results of another model or setting are neither shown nor saved.
-  for (const picture of pictures) {
+  for (const picture of all) {
     Object.assign(picture, { result: null, error: null });
     picture.small.textContent = waitingText();
   }
   showCurrent();
-  detectInAll([...pictures]);
+  detectInAll(all);
 }
 
 async function detectInPicture(picture, mine) {
   if (modelOpen) {
+    const outcome = { result: null, error: null };
     try {
-      const result = await detector.look(picture.file, element("verify").checked);
-      if (mine !== generation) {
-        return;
-      }
-      picture.result = result;
-      picture.error = null;
-      picture.small.textContent = inAWord(result);
+      const image = picture.file ?? (await createImageBitmap(picture.bitmap));
+      outcome.result = await detector.look(image, element("verify").checked);
     } catch (error) {
-      if (mine !== generation) {
-        return;
-      }
-      picture.result = null;
-      picture.error = error.message;
-      picture.small.textContent = error.message;
+      outcome.error = error.message;
     }
+    if (mine !== generation) {
+      return;
+    }
+    Object.assign(picture, outcome);
+    picture.small.textContent = outcome.error ?? inAWord(outcome.result);
   }
   // Decoded for display only after the search, because the search rejects files that are no pictures or are too large.
   if (!picture.bitmap && !picture.error) {
@@ -246,6 +275,7 @@ function choose(picture) {
   showCurrent();
 }
 
+/** Starts the camera, or stops it, also while it starts. */
 async function toggleCamera() {
   if (camera.running) {
     stopCamera();
@@ -271,39 +301,44 @@ function stopCamera() {
 }
 
 async function detectInFrame(bitmap) {
+  const mine = generation;
   const shown = await createImageBitmap(bitmap);
-  try {
-    const result = await detector.look(bitmap, element("verify").checked);
-    if (camera.running) {
-      current?.frame?.close();
-      current = { frame: shown, bitmap: shown, result };
-      showCurrent();
-    }
-  } catch (error) {
-    // The model was closed on purpose.
-    if (!camera.running) {
-      return;
-    }
-    complain(error.message);
-    stopCamera();
+  const result = await detector.look(bitmap, element("verify").checked);
+  if (mine !== generation || !camera.running) {
+    return;
   }
+  if (current && !current.file) {
+    current.bitmap.close();
+  }
+  current = { file: null, bitmap: shown, result, error: null, small: make("small", "") };
+  showCurrent();
 }
 
 function showCurrent() {
   const canvas = element("picture");
   const { bitmap, result, error } = current ?? {};
-  element("empty").hidden = Boolean(bitmap);
-  canvas.hidden = !bitmap;
+  const isDrawn = Boolean(bitmap) && !error;
+  element("empty").hidden = isDrawn;
+  canvas.hidden = !isDrawn;
   element("grasps").hidden = true;
   element("download").hidden = !pictures.some((picture) => picture.result);
-  if (error) {
+  if (!current || error) {
     say("");
-    element("empty").textContent = error;
-    return;
+  } else if (result) {
+    const frames = (1000 / result.milliseconds).toFixed(1);
+    say(`${inAWord(result)} · ${result.milliseconds.toFixed(0)} ms a frame (${frames} a second)`);
+    listGrasps(result.record.detections);
+  } else {
+    say(modelOpen ? "Looking…" : "Waiting for a model.");
   }
-  if (!bitmap) {
-    return;
+  if (isDrawn) {
+    draw(canvas, bitmap, result);
+  } else if (current) {
+    element("empty").textContent = error ?? (result ? "This browser cannot show this picture." : "");
   }
+}
+
+function draw(canvas, bitmap, result) {
   const record = result?.record ?? { width: bitmap.width, detections: [] };
   // The picture is shown reduced, but positions are in pixels of the original image.
   const shrink = bitmap.width / record.width;
@@ -311,13 +346,6 @@ function showCurrent() {
     refused: element("refused").checked,
   });
   canvas.setAttribute("aria-label", result ? inAWord(result) : "Not searched yet");
-  if (result) {
-    const frames = (1000 / result.milliseconds).toFixed(1);
-    say(`${inAWord(result)} · ${result.milliseconds.toFixed(0)} ms a frame (${frames} a second)`);
-    listGrasps(record.detections);
-  } else {
-    say(modelOpen ? "Looking…" : "Waiting for a model.");
-  }
 }
 
 function shrunk(factor) {

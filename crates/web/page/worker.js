@@ -1,22 +1,26 @@
-// The thread of the model: it keeps the page responsive. One request at a time, answered in order.
+// The thread of the model: it keeps the page responsive. The page sends a request when the one before is answered.
 //
-//   {id, open: ArrayBuffer}                    a model file      → {id, summary}
-//   {id, look: Blob, verify}                   an image file     → {id, record, milliseconds, decoded}
-//   {id, look: ImageBitmap, verify}            a camera's frame  → {id, record, milliseconds, decoded}
-//   any error                                                    → {id, error}
+//   {open: ArrayBuffer}                    a model file      → {summary}
+//   {look: Blob, verify}                   an image file     → {record, milliseconds, decoded}
+//   {look: ImageBitmap, verify}            a camera's frame  → {record, milliseconds, decoded}
+//   any error                                                → {error, stopped}
 //
-// `milliseconds` is the duration of the search; `decoded` the duration of decoding. After a panic the module's memory is not
-// valid: the answer contains `stopped`, and the page starts another worker.
+// `milliseconds` is the duration of the search; `decoded` the duration of decoding. `stopped` is true if this worker
+// cannot answer any more, and the page starts another one: after a panic the module's memory is not valid, and a worker
+// does not load a module again that it could not load.
 //
 // The address selects the device: `worker.js?device=webgpu` uses the graphics card, with another module.
 
 /** Maximum size of an image file, as on the command line. */
 const MAX_IMAGE_BYTES = 256 * 2 ** 20;
+const STOPPED = { error: "the model ran out of memory or failed internally, and was restarted", stopped: true };
 
 const onCard = new URL(import.meta.url).searchParams.get("device") === "webgpu";
 const ready = load(onCard ? "./webgpu/sdg_web" : "./sdg_web");
+ready.catch(() => {}); // The first request gets the error.
 let Model = null;
 let model = null;
+let isAnswering = false;
 
 async function load(name) {
   const module = await import(`${name}.js`);
@@ -58,11 +62,10 @@ async function prepared(image, verify) {
   }
   const bytes = new Uint8Array(await image.arrayBuffer());
   const head = String.fromCharCode(...bytes.subarray(0, 12));
-  const othersOfTheWeb = head.startsWith("RIFF") || head.startsWith("GIF8") || head.slice(4, 8) === "ftyp";
-  if (othersOfTheWeb) {
-    return detectInBitmap(await createImageBitmap(image), verify);
-  }
-  return () => model.detectInFile(bytes, verify);
+  const othersOfTheWeb = /^(RIFF|GIF8|BM|....ftyp)/s.test(head);
+  // Our decoder's error also tells how to get a picture from a file that the browser cannot decode, such as HEIC.
+  const bitmap = othersOfTheWeb && (await createImageBitmap(image).catch(() => null));
+  return bitmap ? detectInBitmap(bitmap, verify) : () => model.detectInFile(bytes, verify);
 }
 
 function detectInBitmap(bitmap, verify) {
@@ -76,15 +79,25 @@ function detectInBitmap(bitmap, verify) {
   return () => model.detectInPixels(pixels, width, height, verify);
 }
 
-let before = Promise.resolve();
-onmessage = ({ data: request }) => {
-  before = before.then(async () => {
-    try {
-      postMessage({ id: request.id, ...(await answer(request)) });
-    } catch (error) {
-      const stopped = error instanceof WebAssembly.RuntimeError;
-      const message = stopped ? "the model ran out of memory or failed internally, and was restarted" : error.message;
-      postMessage({ id: request.id, error: message, stopped });
-    }
-  });
+async function answerOrError(request) {
+  try {
+    return await answer(request);
+  } catch (error) {
+    return error instanceof WebAssembly.RuntimeError ? STOPPED : { error: error.message, stopped: !Model };
+  }
+}
+
+onmessage = async ({ data: request }) => {
+  isAnswering = true;
+  const answered = await answerOrError(request);
+  isAnswering = false;
+  postMessage(answered);
 };
+
+// The module computes in microtasks: a panic in one is an error of the worker, and leaves the request's promise pending.
+addEventListener("error", (event) => {
+  if (isAnswering) {
+    event.preventDefault();
+    postMessage(STOPPED);
+  }
+});

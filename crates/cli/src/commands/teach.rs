@@ -12,7 +12,7 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_evaluation::{TaughtFile, quoted, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{AcceptedNegative, CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
+use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, SearchRegion, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights, first_names};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -219,9 +219,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     for warning in figures.warnings() {
         eprintln!("{} {warning}", Paint::stderr().text(Tone::Doubtful, "warning:"));
     }
-    for AcceptedNegative { idx, score } in &taught.accepted_negatives {
-        let (warning, picture) = (Paint::stderr().text(Tone::Doubtful, "warning:"), args.negatives[*idx].display());
-        eprintln!("{warning} --negative {picture}: still accepted with {score:.2}: does it show the part?");
+    for accepted in &taught.accepted_negatives {
+        let (warning, picture) = (Paint::stderr().text(Tone::Doubtful, "warning:"), &args.negatives[accepted.idx]);
+        eprintln!("{warning} --negative {}: {accepted}", picture.display());
     }
     for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");

@@ -25,6 +25,8 @@ pub struct Evaluated<'a> {
     pub left_out: Vec<LeftOut>,
     /// Number of instances with labels of other objects.
     pub others: usize,
+    /// The label of all instances, if it is not the model's object: they count as the part.
+    pub foreign_label: Option<String>,
 }
 
 impl Evaluated<'_> {
@@ -70,6 +72,7 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
         "by_min_score": by_min_score(&tested),
         "left_out": evaluated.left_out,
         "other_labels": evaluated.others,
+        "foreign_label": evaluated.foreign_label,
         "report": report.display().to_string(),
     })
 }

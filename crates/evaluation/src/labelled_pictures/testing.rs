@@ -18,6 +18,8 @@ pub struct TestedFolder {
     pub left_out: Vec<LeftOut>,
     /// Number of instances with labels of other objects.
     pub others: usize,
+    /// See [`LabelledFolder::foreign_label`].
+    pub foreign_label: Option<String>,
 }
 
 impl LabelledFolder {
@@ -33,7 +35,7 @@ impl LabelledFolder {
         min_score: f64,
         progress: &dyn Progress,
     ) -> Result<TestedFolder> {
-        let Self { pictures, mut left_out, others, .. } = self;
+        let Self { pictures, mut left_out, others, foreign_label } = self;
         progress.expect(pictures.len());
         let mut tested = Vec::with_capacity(pictures.len());
         for picture in pictures {
@@ -51,6 +53,6 @@ impl LabelledFolder {
             progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
             tested.push(of_picture);
         }
-        Ok(TestedFolder { tested, left_out, others })
+        Ok(TestedFolder { tested, left_out, others, foreign_label })
     }
 }

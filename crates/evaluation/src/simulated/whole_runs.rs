@@ -11,15 +11,7 @@ use crate::axes::{
     Against, AxesEvaluation, AxesSummary, GraspCondition, GroupSummary, Selection, Way, difference_tables,
 };
 use crate::cameras::{self, CamerasEvaluation, CamerasSummary, PictureSet};
-use crate::{Evaluation, Progress, Settings, Share, Store, Summary, TeachingRecord, markdown, page};
-
-struct Silent;
-
-impl Progress for Silent {
-    fn expect(&self, _units: usize) {}
-    fn unit_done(&self, _what: &str) {}
-    fn print_line(&self, _text: &str) {}
-}
+use crate::{Evaluation, NoProgress, Settings, Share, Store, Summary, TeachingRecord, markdown, page};
 
 const ATTEMPTS: &str = "cells/S-rod_end.attempts-verified.json";
 const MODEL: &str = "models/S-rod_end.sdg";
@@ -49,7 +41,7 @@ fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
         unverified: true,
         jobs: 2,
     };
-    let ended = evaluation.run(is_interrupted, &Silent).unwrap();
+    let ended = evaluation.run(is_interrupted, &NoProgress).unwrap();
     let mut summaries = Summary::collect(&evaluation).unwrap();
     assert!(page(&summaries, &store, &[], "sdg evaluate").unwrap().to_html().is_ok());
     let summary = summaries.remove(0);
@@ -121,7 +113,7 @@ fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> 
         search_points: None,
         jobs: 2,
     };
-    let ended = evaluation.run(is_interrupted, &Silent).unwrap();
+    let ended = evaluation.run(is_interrupted, &NoProgress).unwrap();
     let summary = AxesSummary::collect(&evaluation).unwrap();
     assert_eq!(ended.remaining, summary.remaining);
     assert!(ended.failures.is_empty(), "{:?}", ended.failures);
@@ -180,7 +172,7 @@ fn go_on_with_cameras(
         photos,
         jobs: 1,
     };
-    evaluation.run(is_interrupted, &Silent).unwrap();
+    evaluation.run(is_interrupted, &NoProgress).unwrap();
     CamerasSummary::collect(&evaluation).unwrap()
 }
 

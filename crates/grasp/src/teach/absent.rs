@@ -7,6 +7,7 @@
 //!                          ─ log-odds that are subtracted from every score
 //! ```
 
+use std::fmt;
 use std::ops::RangeInclusive;
 
 use image::{RgbImage, imageops};
@@ -51,6 +52,12 @@ pub struct AcceptedNegative {
     pub idx: usize,
     /// The best score in the picture.
     pub score: f64,
+}
+
+impl fmt::Display for AcceptedNegative {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "still accepted with {:.2}: does it show the part?", self.score)
+    }
 }
 
 /// Samples made from pictures without the part.

@@ -3,6 +3,8 @@
 
 use std::path::PathBuf;
 
+use serde_json::json;
+
 use crate::taught::{Made, demonstration};
 use crate::{assert_quiet, choose, complaint, open_model, open_page, screenshots, site};
 
@@ -59,6 +61,77 @@ fn wrong_files_are_told_apart() {
     }
     let stage = browser.run("return document.getElementById('empty').textContent", &[]).unwrap();
     assert_eq!(stage, text[0], "expected the error of the chosen picture on the stage");
+    assert_quiet(&browser);
+}
+
+/// A BMP file of 24 bits per pixel; its rows need no padding if the width is a multiple of four.
+fn bmp(picture: &image::RgbImage) -> Vec<u8> {
+    let (width, height) = picture.dimensions();
+    let num_bytes = 3 * width * height;
+    let mut file = b"BM".to_vec();
+    for number in [54 + num_bytes, 0, 54, 40, width, height] {
+        file.extend(number.to_le_bytes());
+    }
+    file.extend([1, 0, 24, 0]);
+    for number in [0, num_bytes, 0, 0, 0, 0] {
+        file.extend(number.to_le_bytes());
+    }
+    for y in (0..height).rev() {
+        for x in 0..width {
+            let [red, green, blue] = picture.get_pixel(x, y).0;
+            file.extend([blue, green, red]);
+        }
+    }
+    file
+}
+
+#[test]
+#[ignore = "needs Chromium and target/web: make test-web"]
+fn a_picture_is_searched_if_the_browser_or_the_module_decodes_it() {
+    let made = Made::new();
+    let model = made.model("S");
+    let site = site();
+    let browser = open_page(&site, &[]);
+    open_model(&browser, &model);
+    let photo = image::open(demonstration()).unwrap().to_rgb8();
+    let (width, height) = photo.dimensions();
+    let ppm = [format!("P6\n{width} {height}\n255\n").into_bytes(), photo.as_raw().clone()].concat();
+    let heic = b"\0\0\0\x18ftypheic\0\0\0\0mif1heic".to_vec();
+    let write = |(name, content): (&str, Vec<u8>)| {
+        let path = made.path(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let pictures = [("phone.heic", heic), ("photo.bmp", bmp(&photo)), ("photo.ppm", ppm)].map(write);
+    choose(&browser, "#image-files", &pictures);
+    let done = "const texts = [...document.querySelectorAll('#pictures small')].map((small) => small.textContent);
+        return texts.length === 3 && texts.slice(1).every((text) => text === 'One grasp') && texts";
+    let texts = browser.wait_for("the last picture to be looked at", done).unwrap();
+    assert!(texts[0].as_str().unwrap().contains("Most Compatible"), "{texts}");
+    // Chromium draws no PPM: nothing of the picture before is shown, and its grasp is listed.
+    browser.find("#pictures li:last-child button").unwrap().click().unwrap();
+    let shown =
+        "const [status, empty, grasps] = ['status', 'empty', 'grasps'].map((id) => document.getElementById(id));
+        const [isFound, rows] = [status.textContent.startsWith('One grasp'), grasps.tBodies[0].rows];
+        return [isFound, empty.textContent, grasps.hidden, rows.length]";
+    let shown = browser.run(shown, &[]).unwrap();
+    assert_eq!(shown, json!([true, "This browser cannot show this picture.", false, 1]));
+    assert_quiet(&browser);
+}
+
+#[test]
+#[ignore = "needs Chromium and target/web: make test-web"]
+fn the_error_of_a_model_stays_when_pictures_are_dropped_with_it() {
+    let site = site();
+    let browser = open_page(&site, &[]);
+    let drop = "const dropped = new DataTransfer();
+        dropped.items.add(new File(['no model'], 'bad.sdg'));
+        dropped.items.add(new File(['no picture'], 'bad.png'));
+        dispatchEvent(new DragEvent('drop', { dataTransfer: dropped, cancelable: true }))";
+    browser.run(drop, &[]).unwrap();
+    browser.wait_for("the picture", "return document.querySelector('#pictures small') !== null").unwrap();
+    let text = complaint(&browser);
+    assert!(text.starts_with("bad.sdg: expected a grasp model file"), "{text}");
     assert_quiet(&browser);
 }
 

@@ -3,7 +3,10 @@
 use sdg_webdriver::{Browser, Site};
 
 use crate::taught::{Made, demonstration};
-use crate::{SOFTWARE_CARD, assert_quiet, complaint, open_model, open_page, screenshots, site};
+use crate::{
+    FOUND, SOFTWARE_CARD, assert_no_complaint, assert_quiet, choose, complaint, open_model, open_page, screenshots,
+    site,
+};
 
 /// A page in a browser with a camera and these flags.
 fn with_camera(site: &Site, made: &Made, further: &[&str]) -> Browser {
@@ -36,6 +39,71 @@ fn a_grasp_is_found_in_the_camera_s_frames() {
     browser.find("#camera").unwrap().click().unwrap();
     let pressed = browser.run("return document.getElementById('camera').getAttribute('aria-pressed')", &[]).unwrap();
     assert_eq!(pressed, "false");
+    // The last frame is searched again with other settings.
+    let watch = "window.said = [];
+        const status = document.getElementById('status');
+        new MutationObserver(() => window.said.push(status.textContent)).observe(status, { childList: true })";
+    browser.run(watch, &[]).unwrap();
+    browser.find("#verify").unwrap().click().unwrap();
+    let said = browser.wait_for("another search", "return window.said.length > 1 && window.said").unwrap();
+    assert_eq!(said[0], "Looking…");
+    assert!(said[1].as_str().unwrap().contains("ms a frame"), "{said}");
+    assert_quiet(&browser);
+}
+
+/// Keeps the streams of the camera, and holds back each until `consent` is called, like a question of the browser.
+const HOLD_BACK: &str = "const devices = navigator.mediaDevices;
+    const open = devices.getUserMedia.bind(devices);
+    window.streams = [];
+    devices.getUserMedia = async (wanted) => {
+        const stream = await open(wanted);
+        window.streams.push(stream);
+        await new Promise((resolve) => (window.consent = resolve));
+        return stream;
+    }";
+
+#[test]
+#[ignore = "needs Chromium and target/web: make test-web"]
+fn a_camera_that_is_stopped_while_it_starts_or_is_unplugged_is_switched_off() {
+    let made = Made::new();
+    let model = made.model("S");
+    let site = site();
+    let browser = with_camera(&site, &made, &[]);
+    open_model(&browser, &model);
+    browser.run(HOLD_BACK, &[]).unwrap();
+    let click = || browser.find("#camera").unwrap().click().unwrap();
+    let start = |count: usize| {
+        click();
+        browser.wait_for("the camera's stream", &format!("return window.streams.length === {count}")).unwrap();
+    };
+    let consent = || browser.run("window.consent()", &[]).unwrap();
+    let assert_switched_off = || {
+        let ended = "return window.streams.at(-1).getTracks().every(({ readyState }) => readyState === 'ended')
+            && document.getElementById('camera').getAttribute('aria-pressed') === 'false'";
+        browser.wait_for("the camera to be switched off", ended).unwrap();
+    };
+    // Stopped by another click.
+    start(1);
+    click();
+    consent();
+    assert_switched_off();
+    assert_no_complaint(&browser);
+    // Stopped by a picture, which stays chosen.
+    start(2);
+    choose(&browser, "#image-files", &[demonstration()]);
+    browser.wait_for("the picture to be looked at", FOUND).unwrap();
+    consent();
+    assert_switched_off();
+    assert_no_complaint(&browser);
+    // Unplugged: the tracks end without `stop` of the page.
+    start(3);
+    browser.run("document.getElementById('status').textContent = ''", &[]).unwrap();
+    consent();
+    let status = "return /ms a frame/.test(document.getElementById('status').textContent)";
+    browser.wait_for("a frame to be looked at", status).unwrap();
+    browser.run("window.streams.at(-1).getTracks().forEach((track) => track.stop())", &[]).unwrap();
+    assert!(complaint(&browser).contains("the camera was unplugged"));
+    assert_switched_off();
     assert_quiet(&browser);
 }
 
@@ -59,7 +127,6 @@ fn the_end_of_a_search_by_another_device_is_no_error() {
     browser.wait_for("a frame to be looked at", status).unwrap();
     // Back to the processor, which ends the search of the current frame at once.
     switch();
-    let complaint = browser.run("return document.getElementById('alert').textContent", &[]).unwrap();
-    assert_eq!(complaint, "");
+    assert_no_complaint(&browser);
     assert_quiet(&browser);
 }

@@ -42,6 +42,10 @@ fn site() -> Site {
 const SOFTWARE_CARD: [&str; 3] =
     ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
 
+/// Whether the first picture of the list was searched and is shown with one grasp.
+const FOUND: &str = "return document.querySelector('#pictures small').textContent === 'One grasp'
+    && /ms a frame/.test(document.getElementById('status').textContent)";
+
 /// Opens the page in a browser with these flags.
 fn open_page(site: &Site, flags: &[&str]) -> Browser {
     let flags = flags.iter().map(|flag| (*flag).to_owned()).collect();
@@ -67,6 +71,10 @@ fn open_model(browser: &Browser, file: &Path) {
 fn complaint(browser: &Browser) -> String {
     let shown = "const a = document.getElementById('alert'); return a.hidden ? '' : a.textContent";
     browser.wait_for("a complaint", shown).unwrap().as_str().unwrap().to_owned()
+}
+
+fn assert_no_complaint(browser: &Browser) {
+    assert_eq!(browser.run("return document.getElementById('alert').textContent", &[]).unwrap(), "");
 }
 
 fn assert_quiet(browser: &Browser) {

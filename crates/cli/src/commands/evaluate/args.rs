@@ -29,7 +29,8 @@ Labelled pictures (--pictures DIR):
   pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
   seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
   error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`, in pixels}]}]; by_kind [{kind, found, parts, wrong,
-  false_alarms, pictures_without_part}], empty unless truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report;
+  false_alarms, pictures_without_part}], empty unless truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels;
+  foreign_label (of all instances, if it is not the model's part: they count as the part) or null; report;
   label_offset {agreeing {count, of}, along_percent, across_percent, px, turn_deg, totals}, if the labels mark another grasp on the part.
   The exit code is 3 if parts are marked and nothing was detected.";
 

@@ -36,12 +36,21 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
     let verification = verification(args.no_verify, model);
     let progress = EvaluationProgress::new();
-    let TestedFolder { tested, left_out, others } =
+    let TestedFolder { tested, left_out, others, foreign_label } =
         labelled.test(&detector, verification, args.min_score, &progress)?;
     progress.finish();
 
-    let evaluated =
-        Evaluated { folder, model_file, model, verification, min_score: args.min_score, tested, left_out, others };
+    let evaluated = Evaluated {
+        folder,
+        model_file,
+        model,
+        verification,
+        min_score: args.min_score,
+        tested,
+        left_out,
+        others,
+        foreign_label,
+    };
     let report = page(&evaluated, &command(args, folder, model_file))?.write(&report_folder)?;
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
