@@ -9,9 +9,9 @@
 //!     tried/                   pictures added on the page
 //! ```
 //! Names are relative to the project's folder for files in it. A project's folder may contain pictures that its file
-//! does not name, because they were added later: such a picture is a photo if it has marks beside it, otherwise a
-//! picture to try. In a new folder with several pictures and no marks, the user chooses the photo. A photo's own
-//! project ignores the other files of the folder.
+//! does not name, because they were added later: such a picture is a photo if it has marks beside it (in a text file:
+//! with a grasp), otherwise a picture to try; if its marks cannot be read, it is left out. In a new folder with several
+//! pictures and no marks, the user chooses the photo. A photo's own project ignores the other files of the folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

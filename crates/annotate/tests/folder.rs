@@ -425,7 +425,8 @@ fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
 #[test]
 fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
     let served = Served::of_photo(folder_of(&["rod.png", "other.png", "second.png"]), "rod.png");
-    let files = || std::fs::read_dir(served.folder.path()).unwrap().count();
+    let is_hidden = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with('.');
+    let files = || std::fs::read_dir(served.folder.path()).unwrap().flatten().filter(|file| !is_hidden(file)).count();
     let before = files();
     let tried = served.ask("POST", "/api/trial-pictures?name=other.png", &photo_png()).json();
     assert_eq!(tried["name"], "other.png");
@@ -433,7 +434,7 @@ fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
     let photo = served.ask("POST", "/api/images?name=second.png", &photo_png()).json();
     assert_eq!(photo["name"], "second.png");
     assert_eq!(session(&served)["others"], json!([]));
-    // The project's file and no copies.
+    // The project's file and no copies; locks are hidden files.
     assert_eq!(files(), before + 1);
     // Another picture of the same name is copied.
     std::fs::write(served.folder.path().join("third.png"), b"another content").unwrap();
