@@ -52,7 +52,7 @@ async function send(method, path, body, options = {}) {
     throw new RequestError("sdg annotate was started again.", true);
   }
   if (response.ok) return options.isPicture ? response.blob() : response.json();
-  if (response.status === 413) throw new RequestError("That is too large.");
+  if (response.status === 413) throw new RequestError(`${body?.name ?? "That"} is too large.`);
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
   try {
@@ -67,6 +67,17 @@ async function send(method, path, body, options = {}) {
 let lastDetection = Promise.resolve();
 const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
+/** The address of a picture. In another session its number is that of another picture, which the browser must not take from its memory. */
+const pictureUrl = (kind, id) => `/api/${kind}/${id}/picture?${sessionId}`;
+
+/** Sends a picture's file, whose name ends the address. It is read first: a request with an unreadable file fails as without a server. */
+async function upload(path, file) {
+  await file.slice(0, 1).arrayBuffer().catch(() => {
+    throw new RequestError(`${file.name}: the browser cannot read this file.`);
+  });
+  return send("POST", `/api/${path}=${encodeURIComponent(file.name)}`, file);
+}
+
 const json = (method, path, value, options) => send(method, path, JSON.stringify(value), options);
 
 /** Browsers do not keep larger requests alive after the page is closed. */
@@ -74,13 +85,13 @@ const MAX_KEEPALIVE_CHARS = 20000;
 
 export const api = {
   session: (options) => send("GET", "/api/session", undefined, options),
-  createProject: (name, photo) => send("POST", `/api/projects?name=${encodeURIComponent(name)}&photo=${encodeURIComponent(photo.name)}`, photo),
+  createProject: (name, photo) => upload(`projects?name=${encodeURIComponent(name)}&photo`, photo),
   openProject: (id) => send("POST", `/api/projects/${id}/open`),
   closeProject: () => send("DELETE", "/api/projects"),
   addPhoto: (id) => send("POST", `/api/others/${id}/photo`),
   addOtherTrial: (id) => send("POST", `/api/others/${id}/try`),
-  otherUrl: (id) => `/api/others/${id}/picture`,
-  uploadPhoto: (file) => send("POST", `/api/images?name=${encodeURIComponent(file.name)}`, file),
+  otherUrl: (id) => pictureUrl("others", id),
+  uploadPhoto: (file) => upload("images?name", file),
   rename: (label) => json("PUT", "/api/label", { label }),
   setRegion: (region) => inTurn(() => json("PUT", "/api/region", region)),
   // `keepalive`: marks made just before closing the page are saved too.
@@ -94,13 +105,13 @@ export const api = {
   setAbsent: (id, absent) => json("PUT", `/api/trial-pictures/${id}/absent`, { absent }),
   useModel: (id) => send("PUT", `/api/models/${id}/current`),
   compareModels: (one, other) => inTurn(() => send("POST", `/api/models/${one}/compare/${other}`)),
-  imageUrl: (id) => `/api/images/${id}/picture`,
-  sampleUrl: (id, index, seed, revision) => `/api/images/${id}/samples/${index}?seed=${seed}&revision=${revision}`,
+  imageUrl: (id) => pictureUrl("images", id),
+  sampleUrl: (id, index, seed, revision) => `/api/images/${id}/samples/${index}?seed=${seed}&revision=${revision}&${sessionId}`,
   teach: (request) => json("POST", "/api/teaching", request),
   teaching: () => send("GET", "/api/teaching"),
   stopTeaching: () => send("DELETE", "/api/teaching"),
-  addTrialPicture: (file) => send("POST", `/api/trial-pictures?name=${encodeURIComponent(file.name)}`, file),
-  trialPictureUrl: (id) => `/api/trial-pictures/${id}/picture`,
+  addTrialPicture: (file) => upload("trial-pictures?name", file),
+  trialPictureUrl: (id) => pictureUrl("trial-pictures", id),
   detect: (id) => inTurn(() => send("POST", `/api/trial-pictures/${id}/detect`)),
   wouldHelp: (id, question) => inTurn(() => json("POST", `/api/trial-pictures/${id}/would-help`, question)),
   live: () => send("GET", "/api/live"),

@@ -40,9 +40,9 @@ export function commit(found = null) {
 
 function travel(from, to) {
   const target = image();
-  if (!from(target).length) return;
-  to(target).push([target.committed, target.found]);
-  [target.committed, target.found] = from(target).pop();
+  if (!target[from].length) return;
+  target[to].push([target.committed, target.found]);
+  [target.committed, target.found] = target[from].pop();
   target.marks = JSON.parse(target.committed);
   target.waiting = [];
   Object.assign(state, { draft: null, vertex: null });
@@ -50,8 +50,8 @@ function travel(from, to) {
   changed();
 }
 
-export const undo = () => travel((t) => t.past, (t) => t.future);
-export const redo = () => travel((t) => t.future, (t) => t.past);
+export const undo = () => travel("past", "future");
+export const redo = () => travel("future", "past");
 
 /** Sends the marks; one request at a time for each photo, followed by later changes. */
 export async function save(target) {
@@ -95,11 +95,19 @@ export function setTool(tool) {
   changed();
 }
 
-export function setBox([x1, y1, x2, y2]) {
-  const [width, height] = size();
-  const xs = [x1, x2].map((x) => clamp(x, 0, width)).sort((a, b) => a - b);
-  const ys = [y1, y2].map((y) => clamp(y, 0, height)).sort((a, b) => a - b);
-  marks().box = [xs[0], ys[0], xs[1], ys[1]];
+/** The nearest place of the photo. */
+export const inPhoto = (point) => point.map((v, axis) => clamp(v, 0, size()[axis]));
+
+const corners = (box) => [box.slice(0, 2), box.slice(2)];
+
+export function setBox(box) {
+  marks().box = boundsOf(corners(box).map(inPhoto));
+}
+
+/** Moves the edges of a box that are named by directions: `nw` moves the left and the upper one. */
+export function moveEdges([x1, y1, x2, y2], edge, [dx, dy]) {
+  const by = (side, way) => (edge.includes(side) ? way : 0);
+  setBox([x1 + by("w", dx), y1 + by("n", dy), x2 + by("e", dx), y2 + by("s", dy)]);
 }
 
 export function setGripper(gripper) {
@@ -150,13 +158,7 @@ export const strokesOf = (target) => [...howFound(target).strokes, ...target.wai
 
 /** States that the area under a stroke belongs to the part or does not; the outline is corrected by all of its strokes. */
 export function strokeOutline(points, isInside) {
-  const target = image();
-  const box = boxOf(target);
-  if (!box) return toast("Draw a box around the part first: the outline is detected inside it.");
-  // Areas of the part outside the box enlarge the box.
-  const grown = boundsOf([box.slice(0, 2), box.slice(2), ...points]);
-  if (isInside && String(grown) !== String(box)) setBox(grown);
-  target.waiting.push({ points, isInside });
+  image().waiting.push({ points, isInside });
   return proposeOutline({ isStroke: true });
 }
 
@@ -205,32 +207,40 @@ export function proposeOutline(options = {}) {
 async function detectOutline(target, { quietly = false, isStroke = false }) {
   const { base, strokes: earlier, box: drawn } = isStroke ? howFound(target) : { base: null, strokes: [], box: null };
   const added = isStroke ? [...target.waiting] : [];
-  // No stroke waits any more: all were answered together, or taken back.
-  if (isStroke && !added.length) return;
-  const strokes = [...earlier, ...added];
-  // Strokes are applied within the box that was drawn, even after the box was fitted to the outline.
+  // No stroke waits any more: all were answered together, or taken back. Or the user did not ask for an outline, and has made one or removed the box.
+  if (isStroke ? !added.length : quietly && (target.marks.outline || !target.marks.box)) return;
   const own = boxOf(target);
-  const box = drawn && own ? boundsOf([drawn, own].flatMap((b) => [b.slice(0, 2), b.slice(2)])) : own;
-  if (!box) {
+  if (!own) {
+    target.waiting = [];
     setTool("box");
     return toast("Draw a box around the part first: the outline is detected inside it.");
   }
+  const strokes = [...earlier, ...added];
+  // Areas of the part outside the box enlarge the box, together with the outline.
+  const grown = boundsOf([...corners(own), ...added.flatMap(({ points, isInside }) => (isInside ? points : []))]);
+  // Strokes are applied within the box that was drawn, even after the box was fitted to the outline.
+  const box = boundsOf([drawn ?? grown, grown].flatMap(corners));
+  const about = () => JSON.stringify([boxOf(target), target.marks.outline], round);
+  const asked = about();
   state.proposing = true;
   changed();
   try {
     const said = strokes.map(({ points, isInside }) => ({ points, is_inside: isInside }));
     const { outline } = await api.proposeOutline(target.id, box, said, base);
-    // An outline made in the meantime takes precedence over one that the user did not ask for, and strokes taken back do not count.
-    const waited = target === image() && !(quietly && target.marks.outline) && added.every((stroke) => target.waiting.includes(stroke));
+    // An answer about a box or an outline that has changed in the meantime is discarded, and strokes taken back do not count.
+    const waited = target === image() && about() === asked && added.every((stroke) => target.waiting.includes(stroke));
     if (waited && !outline) {
       if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");
     } else if (waited) {
       const before = target.marks.outline;
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
+      if (String(grown) !== String(own)) setBox(grown);
       if (isStroke && target.marks.box) snapBox(target.marks);
       const hasMoved = isStroke && followOutline(target);
       commit({ base, strokes, box: isStroke ? box : null });
+      const { committed } = target;
+      const back = { text: "Undo", run: () => image() === target && target.committed === committed && undo() };
       const last = strokes.at(-1);
       const middle = last?.points[Math.floor(last.points.length / 2)];
       if (!isStroke) toast("Outline found. If wrong, draw “In” or “Out”.");
@@ -239,11 +249,11 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       } else if (last.isInside && !isWithin(middle, outline)) {
         toast("This place is not connected with the part. Draw from there to the part as well, or draw the outline by hand.");
       } else if (hasMoved) {
-        toast("The gripper was not on the part any more: it was moved there.", { text: "Undo", run: undo });
+        toast("The gripper was not on the part any more: it was moved there.", back);
       } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
-        toast("“Out” removed much of the outline.", { text: "Undo", run: undo });
+        toast("“Out” removed much of the outline.", back);
       }
-    }
+    } else if (quietly && target === image()) proposeOutline({ quietly });
   } catch (error) {
     if (!quietly) toast(error.message);
   }
@@ -255,6 +265,7 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
 /** Removes one kind of mark. */
 export function clear(kind) {
   marks()[kind] = null;
+  if (kind !== "grasp") image().waiting = [];
   Object.assign(state, { vertex: null, draft: null, selected: null });
   commit();
   state.tool = nextTool();
@@ -289,8 +300,7 @@ export function nudge(by, handle = null) {
     // A moved box keeps its size.
     const dx = edge === "nwse" ? clamp(by[0], -b[0], w - b[2]) : by[0];
     const dy = edge === "nwse" ? clamp(by[1], -b[1], h - b[3]) : by[1];
-    setBox([b[0] + (edge.includes("w") ? dx : 0), b[1] + (edge.includes("n") ? dy : 0),
-      b[2] + (edge.includes("e") ? dx : 0), b[3] + (edge.includes("s") ? dy : 0)]);
+    moveEdges(b, edge, [dx, dy]);
   } else if (kind === "grasp" && m.grasp) {
     const gripper = gripperOf(m.grasp);
     if (handle?.end) {
@@ -301,10 +311,8 @@ export function nudge(by, handle = null) {
       setGripper({ ...gripper, width: gripper.width + 2 * (by[0] + by[1] > 0 ? 1 : -1) * Math.hypot(...by) * 0.5 });
     } else setGripper({ ...gripper, center: moved(gripper.center) });
   } else if (kind === "outline" && m.outline) {
-    const [w, h] = size();
-    const inside = ([x, y]) => [clamp(x, 0, w), clamp(y, 0, h)];
     const at = handle?.vertex ?? state.vertex;
-    m.outline = m.outline.map((p, i) => (at === null || at === i ? inside(moved(p)) : p));
+    m.outline = m.outline.map((p, i) => (at === null || at === i ? inPhoto(moved(p)) : p));
   } else return false;
   commit();
   return true;

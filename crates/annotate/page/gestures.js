@@ -2,7 +2,7 @@
 
 import { by } from "./elements.js";
 import { add, direction, distanceTo, distanceToEdge, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
-import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
+import { boxDrawn, closeOutline, commit, inPhoto, moveEdges, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX, REACH_PX } from "./overlay.js";
 import { abandonRegion, drawingRegion, isChoosingRegion } from "./region.js";
@@ -23,8 +23,10 @@ const MAX_STROKE_POINTS = 500;
 
 /** Position on the stage of each pressed pointer, by id. */
 const pointers = new Map();
-/** Action of the first pressed pointer: `move(point, event)`, `end(clicked)`. */
+/** Action of the first pressed pointer: `move(point, event)`, `end(clicked)`; and the photo and the step of its begin. */
 let gesture = null;
+export const isDragging = () => Boolean(gesture);
+const isElsewhere = () => gesture.target !== image() || gesture.tab !== state.tab;
 let spaceHeld = false;
 /** Position and time of the outline's last point. */
 let lastPoint = null;
@@ -94,9 +96,7 @@ function addingPoint() {
       const again = lastPoint && performance.now() - lastPoint.time < DOUBLE_MS && norm(sub(at, lastPoint.at)) < CLICK_PX;
       lastPoint = { at, time: performance.now() };
       if (again) return closeOutline(points);
-      const [w, h] = size();
-      const [x, y] = toPhoto(at);
-      points.push([Math.min(Math.max(x, 0), w), Math.min(Math.max(y, 0), h)]);
+      points.push(inPhoto(toPhoto(at)));
       changed();
     },
   };
@@ -136,19 +136,14 @@ function correcting(change) {
 }
 
 function draggingBox(edge, from) {
-  const [x1, y1, x2, y2] = marks().box;
-  return correcting((to) => {
-    const [dx, dy] = sub(to, from);
-    setBox([x1 + (edge.includes("w") ? dx : 0), y1 + (edge.includes("n") ? dy : 0),
-      x2 + (edge.includes("e") ? dx : 0), y2 + (edge.includes("s") ? dy : 0)]);
-  });
+  const { box } = marks();
+  return correcting((to) => moveEdges(box, edge, sub(to, from)));
 }
 
 function draggingVertex(vertex) {
   state.vertex = vertex;
   return correcting((to) => {
-    const [w, h] = size();
-    marks().outline[vertex] = [Math.min(Math.max(to[0], 0), w), Math.min(Math.max(to[1], 0), h)];
+    marks().outline[vertex] = inPhoto(to);
   });
 }
 
@@ -251,10 +246,9 @@ overlay.addEventListener("pointerdown", (event) => {
   if (pointers.size > 1) {
     // Two fingers move the view; the first finger's action is cancelled.
     if (gesture) abandon();
-    gesture = null;
     return;
   }
-  gesture = { ...begin(event, at), from: at };
+  gesture = { ...begin(event, at), from: at, target: image(), tab: state.tab };
 });
 
 overlay.addEventListener("pointermove", (event) => {
@@ -273,6 +267,7 @@ overlay.addEventListener("pointermove", (event) => {
     if (before > 0) zoom(norm(sub(at, other)) / before, times(add(known, other), 0.5));
     pan(times(sub(add(at, other), add(known, other)), 0.5));
   } else if (gesture) {
+    if (isElsewhere()) return abandon();
     gesture.moved ||= norm(sub(at, gesture.from)) > CLICK_PX;
     if (gesture.moved) gesture.move(at, event);
   }
@@ -281,9 +276,9 @@ overlay.addEventListener("pointermove", (event) => {
 
 function up(event) {
   if (!pointers.delete(event.pointerId) || !gesture) return;
+  if (event.type === "pointercancel" || isElsewhere()) return abandon();
   const ended = gesture;
   gesture = null;
-  if (event.type === "pointercancel") return abandon();
   ended.end(!ended.moved, place(event));
 }
 overlay.addEventListener("pointerup", up);
@@ -291,9 +286,10 @@ overlay.addEventListener("pointercancel", up);
 
 /** Restores the marks from before the gesture; an unclosed outline keeps its points. */
 function abandon() {
+  const target = gesture?.target;
   gesture = null;
   stage.classList.remove("panning");
-  if (image()) image().marks = JSON.parse(image().committed);
+  if (target) target.marks = JSON.parse(target.committed);
   if (state.draft?.kind !== "outline") state.draft = null;
   changed();
 }

@@ -58,7 +58,7 @@ function answer() {
   const most = counted.reduce((a, b) => (b.count > (a?.count ?? -1) ? b : a), null);
   if (!most) return { text: "" };
   const { candidate, count, of } = most;
-  const others = of === 1 ? "the other picture in which it is refused" : `${count} of the ${of} other pictures in which it is refused`;
+  const others = of === 1 ? "the other picture in which it is refused" : `${count} of ${of < MAX_OTHERS ? "the " : ""}${of} other pictures in which it is refused`;
   if (!count) return { text: "Learning from one of the refused pictures alone would not help in the others." };
   const text = `${candidate.name} would help most: if the part is where it was refused there, and the model learns from it, the part is found in ${others}.`;
   return { text, candidate };

@@ -3,7 +3,7 @@
 import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, strokeOutline, undo } from "./editing.js";
 import { by } from "./elements.js";
 import { boundsOf, boxPolygon } from "./geometry.js";
-import { holdSpace, letGo } from "./gestures.js";
+import { holdSpace, isDragging, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
 import { openNext } from "./strip.js";
 import { isLive, isMarking, region, size, state, trialPicture } from "./store.js";
@@ -11,7 +11,6 @@ import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 
 const DEGREE = Math.PI / 180;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-const help = by("help");
 const overlay = by("overlay");
 
 /** Creates the chosen mark without a pointer, in the middle of the view or of the part; it can be moved from there. */
@@ -84,7 +83,7 @@ const LOOKING = {
   t: takePhoto,
   l: toggleLive,
   k: keepPicture,
-  "?": () => help.showModal(),
+  "?": () => by("help").showModal(),
   escape: letGo,
 };
 
@@ -102,8 +101,10 @@ document.addEventListener("pointerdown", () => document.documentElement.removeAt
 
 document.addEventListener("keydown", (event) => {
   const writing = event.target.matches("input:not([type=radio]):not([type=file]), select, textarea");
-  if (help.open || event.altKey) return;
+  if (document.querySelector("dialog[open]") || event.altKey) return;
   const key = event.key.toLowerCase();
+  // Until a drag has ended, keys change neither the photo nor its marks.
+  if (isDragging() && key !== "escape") return event.preventDefault();
   if (event.ctrlKey || event.metaKey) {
     const action = { z: event.shiftKey ? redo : undo, y: redo }[key];
     if (key === "s") event.preventDefault();

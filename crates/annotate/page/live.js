@@ -237,7 +237,7 @@ function renderTrying() {
   const isAnswered = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
-  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : `${isRunning() ? "A model is being taught" : "Teach a model first"}: it then looks for the part here.`;
+  const time = isAnswered ? `Search took ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? (live.paused ? "Not searched yet: press “Go on”." : "Looking…") : `${isRunning() ? "A model is being taught" : "Teach a model first"}: it then looks for the part here.`;
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isAnswered ? cards(live.detections) : [];
   if (shows(by("live-found"), told)) return;

@@ -23,7 +23,6 @@ import { renderVersions } from "./versions.js";
 import { fitOrPart } from "./keyboard.js";
 import { renderView, zoom } from "./view.js";
 
-
 /** The theme is stored in the browser. */
 const THEMES = ["auto", "light", "dark"];
 function setTheme(theme) {
@@ -67,7 +66,6 @@ async function open(session) {
     label: session.label,
     isNamed: session.is_named,
     others: session.others,
-    modelPath: session.model_path,
     project: session.project,
     isCalibrated: session.is_calibrated,
     images: session.images.map(adopt),

@@ -55,7 +55,7 @@ by("delete").addEventListener("click", deleteSelected);
 async function rename() {
   try {
     const session = await api.rename(label.value);
-    Object.assign(state, { label: session.label, isNamed: session.is_named, modelPath: session.model_path });
+    Object.assign(state, { label: session.label, isNamed: session.is_named });
     for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id) ?? {}, { saved });
   } catch (error) {
     toast(error.message);

@@ -11,9 +11,8 @@ const SIDES = ["x", "y", "width", "height"];
 /** A region with a shorter side was drawn by mistake. */
 const MIN_SIDE_PX = 8;
 
-/** Whether the next drag on the picture draws the region; the region being drawn, as [x, y, width, height]. */
+/** Whether the next drag on the picture draws the region, which is then in the draft as [x, y, width, height]. */
 let isDrawing = false;
-let drawn = null;
 
 export const isChoosingRegion = () => isDrawing && state.tab === "try";
 
@@ -47,12 +46,12 @@ export function drawingRegion(from) {
       const limits = pictureSize();
       const ends = [from, toPhoto(at)].map((point) => point.map((v, axis) => Math.round(clamp(v, 0, limits[axis]))));
       const [low, high] = [Math.min, Math.max].map((pick) => ends[0].map((v, axis) => pick(v, ends[1][axis])));
-      drawn = [...low, high[0] - low[0], high[1] - low[1]];
+      state.draft = { region: [...low, high[0] - low[0], high[1] - low[1]] };
       changed();
     },
     end(clicked) {
-      const region = drawn;
-      drawn = null;
+      const region = state.draft?.region;
+      state.draft = null;
       if (!clicked && region && Math.min(region[2], region[3]) >= MIN_SIDE_PX) {
         isDrawing = false;
         ofNumbers(region);
@@ -62,10 +61,9 @@ export function drawingRegion(from) {
   };
 }
 
-/** Cancels the drawing. */
+/** The next drag draws no region. */
 export function abandonRegion() {
-  if (!isDrawing) return;
-  [isDrawing, drawn] = [false, null];
+  isDrawing = false;
   changed();
 }
 
@@ -84,7 +82,7 @@ function renderFrame() {
   const overlay = by("overlay");
   let frame = by("region-frame");
   const size = pictureSize();
-  const region = drawn ?? (state.region && SIDES.map((side) => state.region[side]));
+  const region = state.draft?.region ?? (state.region && SIDES.map((side) => state.region[side]));
   if (state.tab !== "try" || !region || !size) return frame?.remove();
   if (!frame) {
     frame = document.createElementNS("http://www.w3.org/2000/svg", "g");

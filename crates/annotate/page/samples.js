@@ -52,6 +52,8 @@ async function explain(event) {
   if (!problem.hidden) return;
   problem.hidden = false;
   const response = await fetch(event.target.src).catch(() => null);
+  // Without an answer, the next rendering requests the samples again.
+  if (!response) delete sheet.dataset.shown;
   const answer = await response?.json().catch(() => null);
   problem.textContent = answer?.error ?? "The samples could not be made.";
 }

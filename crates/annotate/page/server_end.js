@@ -19,19 +19,30 @@ const keptKey = () => `kept-marks:${state.project}`;
 
 const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
 
-/** The waiting marks by the photo's name, of all tabs, and the names of those that this tab has stored. */
+/** The waiting marks of all tabs by the photos' keys, and the keys of those that this tab has stored. */
 const kept = () => JSON.parse(stored(keptKey()) ?? "{}");
 let own = [];
+
+/** The photos with their keys: the name, and a number if an earlier photo has the same name. */
+function keyed() {
+  const counts = {};
+  return state.images.map((target) => {
+    const { name } = target;
+    counts[name] = (counts[name] ?? 0) + 1;
+    return [counts[name] > 1 ? `${name}/${counts[name]}` : name, target];
+  });
+}
 
 /** Stores marks that the server has not received, in place of those that this tab has stored before. While the server answers, marks of other tabs that it has are removed. */
 function keep() {
   const all = kept();
+  const photos = keyed();
   // Marks of another tab that have arrived are not waiting: sent again later, they would revoke an undo.
-  for (const { name, sent } of isLost() ? [] : state.images) if (all[name] && textOf(all[name].marks) === textOf(JSON.parse(sent))) delete all[name];
-  for (const name of own) delete all[name];
-  const unsaved = state.images.filter(isUnsaved);
-  own = unsaved.map(({ name }) => name);
-  for (const { name, sent, marks } of unsaved) all[name] = { was: sent, marks };
+  for (const [key, { sent }] of isLost() ? [] : photos) if (all[key] && textOf(all[key].marks) === textOf(JSON.parse(sent))) delete all[key];
+  for (const key of own) delete all[key];
+  const unsaved = photos.filter(([, target]) => isUnsaved(target));
+  own = unsaved.map(([key]) => key);
+  for (const [key, { sent, marks }] of unsaved) all[key] = { was: sent, marks };
   stored(keptKey(), Object.keys(all).length ? JSON.stringify(all) : null);
 }
 
@@ -39,7 +50,7 @@ onLoss((lost) => {
   banner.hidden = !lost;
   banner.textContent = lost === "key"
     ? "sdg annotate was started again with another key. Open the address that it printed; the marks made since are kept in this browser. (--token-file FILE with --port keeps the key.)"
-    : "sdg annotate has ended, or does not answer. The photo stays and you can go on marking: marks are kept in this browser and sent when it is back.";
+    : `sdg annotate has ended, or does not answer. The photo stays and you can go on marking: marks are kept in this browser, and sent when it answers again. Start it with --port ${location.port}.`;
   document.documentElement.toggleAttribute("data-lost", Boolean(lost));
   if (lost) {
     keep();
@@ -106,10 +117,11 @@ export async function sendKept() {
   stored(keptKey(), null);
   own = [];
   const sent = [];
-  for (const [name, { was, marks }] of Object.entries(all)) {
-    const target = state.images.find((image) => image.name === name);
+  for (const [key, target] of keyed()) {
+    if (!all[key]) continue;
+    const { was, marks } = all[key];
     // Marks changed elsewhere since then are not overwritten.
-    if (!target || textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
+    if (textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
     target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
     sent.push(save(target).then(() => target.saved.state === "written"));

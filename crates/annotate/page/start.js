@@ -2,10 +2,10 @@
 
 import { api } from "./api.js";
 import { button, by, element } from "./elements.js";
+import { PICTURE } from "./words.js";
 
-const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
-/** Names that cameras give to any picture. */
-const ANY_NAME = /^(photo|image|picture|img|pic|dscn?f?|pxl|p|demo|frame|screenshot)?[\W\d_]*$/i;
+/** Names that cameras and people give to any picture, as in ../src/names.rs. */
+const ANY_NAME = /^(photo|image|picture|img|pic|dsc|dscn|dscf|pxl|p|demo|frame|screenshot|webcam)?[\W\d_]*$/i;
 let photo = null;
 
 function fail(message) {

@@ -6,7 +6,6 @@ export const state = {
   label: "",
   /** Whether the user or existing marks gave that name; otherwise it is a proposal. */
   isNamed: true,
-  modelPath: "",
   /** The absolute path of the project's folder, or of the file of a photo's project (null for a camera before its first photo); other pictures of the folder; versions of the model, oldest first. */
   project: undefined,
   others: [],

@@ -101,14 +101,11 @@ export function showCurrent() {
 }
 
 function words(entry, trying) {
-  if (!trying) {
-    const { box, outline, grasp } = entry.marks;
-    return (box || outline) && grasp ? "✓ marked" : box || outline || grasp ? "half marked" : "not marked";
-  }
+  if (!trying) return isComplete(entry) ? "✓ marked" : Object.values(entry.marks).some(Boolean) ? "half marked" : "not marked";
   if (entry.became !== null) return "✓ added";
   if (entry.is_absent) return "✓ not here";
   if (entry.detecting) return "looking…";
-  if (!entry.detections) return "not tried";
+  if (!entry.detections) return entry.failed ? "search failed" : "not tried";
   const found = entry.detections.filter(isFound);
   const count = found.length;
   if (!found.every(isAccepted)) return `${count} above ${state.minScore.toFixed(2)}`;

@@ -67,10 +67,10 @@ export function teachRequest() {
   };
 }
 
-/** Teaches as the form says. */
-export async function teach() {
+/** Teaches as the form says, except for the settings in `own`. */
+export async function teach(own = {}) {
   if (isRunning()) return;
-  const request = teachRequest();
+  const request = { ...teachRequest(), ...own };
   by("teach-error").hidden = true;
   try {
     state.teaching = await api.teach(request);
@@ -78,6 +78,7 @@ export async function teach() {
     watch();
   } catch (error) {
     state.teaching = { ...state.teaching, status: "failed", error: error.message };
+    if (state.tab !== "teach") toast(error.message);
   }
   changed();
 }
@@ -98,6 +99,7 @@ export async function watch() {
       const models = isDone ? (await api.session().catch(() => state)).models : state.models;
       // Another call of this function may have been faster.
       if (isDone && isRunning()) searchAgain({ compares: true });
+      if (news.status === "failed" && isRunning() && state.tab !== "teach") toast(news.error);
       Object.assign(state, { teaching: news, models });
     } catch (error) {
       if (!error.lost) toast(error.message);

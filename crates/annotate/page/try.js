@@ -17,10 +17,9 @@ import { openTab } from "./tabs.js";
 import { isQuick, progressText, teach } from "./teach.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
-import { byName } from "./words.js";
+import { byName, listText, PICTURE } from "./words.js";
 
 const stage = by("stage");
-const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 /** With fewer pictures the order does not matter. */
 const MIN_SORTED = 5;
 const isTaught = () => Boolean(state.hasModel);
@@ -81,15 +80,18 @@ async function addPictures(files) {
   }
   if (pictures.length < files.length) toast(`${files.length - pictures.length} files are left out: no pictures that can be read.`);
   const first = state.trialPictures.length;
+  const errors = [];
   for (const file of pictures) {
     try {
       state.trialPictures.push({ ...(await api.addTrialPicture(file)), detections: null });
       changed();
     } catch (error) {
-      problem.hidden = false;
-      problem.textContent = `${file.name}: ${error.message}`;
+      errors.push(error.message);
+      if (error.lost) break;
     }
   }
+  problem.hidden = !errors.length;
+  problem.textContent = listText(errors, 3);
   if (state.trialPictures.length > first) openTrialPicture(first);
 }
 
@@ -126,7 +128,7 @@ async function accept(marks, { correct }) {
       openTab("mark");
       openImage(state.images.length - 1);
       toast((isOther && view.note) || "Correct the marks; they are saved as you go.");
-    } else if (isQuick()) teach();
+    } else if (isQuick()) teach({ model: "S" });
     else toast(view.note ?? "Now a demonstration. Teach again to learn from it.");
   } catch (error) {
     toast(error.message);
@@ -229,9 +231,10 @@ function renderFound() {
   const wanted = [shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, state.minScore, state.showDifferences, isTaught(), isRunning()];
   if (shows(found, wanted)) return;
   found.replaceChildren();
-  if (!shown || !isTaught()) return;
-  if (shown.failed) return found.append(text("p", shown.failed, "error"));
-  if (!shown.detections) return found.append(text("p", "Looking…"));
+  if (!shown) return;
+  const remove = button("Remove this picture", () => removeTrialPicture(shown), "plain");
+  if (!isTaught()) return found.append(remove);
+  if (!shown.detections) return found.append(text("p", shown.failed ?? "Looking…", shown.failed ? "error" : ""), remove);
   const accepted = shown.detections.filter(isAccepted);
   const refused = shown.detections.length - accepted.length;
   const time = `Search took ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
@@ -256,7 +259,7 @@ function renderFound() {
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
   if (shown.is_absent) found.append(teachButton());
-  found.append(button("Remove this picture", () => removeTrialPicture(shown), "plain"));
+  found.append(remove);
   const more = shown.detections.filter((d) => !isFound(d) && (state.showRefused || !isShown(d, shown))).length;
   if (refused && (more || state.showRefused)) {
     const words = state.showRefused ? "Hide refused parts" : `Show refused parts (${more})`;

@@ -11,6 +11,9 @@ export function listText(words, most = Infinity) {
   return new Intl.ListFormat("en").format(more > 0 ? [...words.slice(0, most), `${more} more`] : words);
 }
 
+/** Names of pictures that can be read. */
+export const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
+
 const collator = new Intl.Collator("en", { numeric: true });
 /** Orders files and pictures by name, numbers in names by value. */
 export const byName = (a, b) => collator.compare(a.webkitRelativePath || a.name, b.webkitRelativePath || b.name);

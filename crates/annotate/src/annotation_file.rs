@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 use sdg_files::{data_yaml_of, marks_of_photo, other_npy_of, write_atomically};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::marks::Marks;
@@ -38,8 +38,18 @@ pub struct Opened {
     pub note: Option<String>,
 }
 
+impl Opened {
+    /// Whether the marks make a picture of a folder a photo of the part. In a text file a grasp is required: boxes may
+    /// be labels of another dataset.
+    pub fn is_of_photo(&self) -> bool {
+        let is_text = self.found.as_ref().is_some_and(|path| path.extension().is_some_and(|kind| kind == "txt"));
+        self.marks.has_object() && (self.marks.grasp.is_some() || !is_text)
+    }
+}
+
 /// Reads the marks of a picture from `annotation`, or from the file beside it with `.coco.json` if that exists; without
-/// `annotation`, from the first file of [`marks_of_photo`].
+/// `annotation`, from the first file of [`marks_of_photo`]. A text file that was not named may be about anything: if it
+/// cannot be read as marks, a note says so.
 ///
 /// # Errors
 /// The file exists but cannot be read, is no annotation, or belongs to another picture.
@@ -49,24 +59,17 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
     let file_name = picture.file_name().and_then(|name| name.to_str());
     let facts = ImageFacts { width: size[0], height: size[1], file_name };
     let searched = annotation.map_or_else(|| marks_of_photo(picture), |_| vec![spare.clone(), own.clone()]);
+    let mut unread = None;
     for path in &searched {
-        let Some(bytes) = read_if_there(path)? else { continue };
-        let format = AnnotationFormat::of(&bytes);
         let is_named = [&spare, &own].contains(&path);
-        // A text that was not named may be about anything, and is empty for a picture without the part.
-        if !is_named && format != Ok(AnnotationFormat::YoloPose) {
-            continue;
-        }
-        let complain = |source| Error::Demonstration { name: path.display().to_string(), source };
-        let second = match format {
-            Ok(AnnotationFormat::YoloPose) => data_yaml_of(path),
-            Ok(AnnotationFormat::OpenDr) => other_npy_of(path),
-            _ => None,
-        };
-        let second = second.map(|path| read_if_there(&path)).transpose()?.flatten();
-        let objects = match Annotation::read_with(&bytes, second.as_deref(), &facts) {
-            Err(sdg_demonstration::Error::NoObject { .. }) => Vec::new(),
-            read => read.map_err(complain)?,
+        let (bytes, objects) = match read(path, is_named, &facts) {
+            Ok(Some(read)) => read,
+            Ok(None) => continue,
+            Err(error) if is_named => return Err(error),
+            Err(error) => {
+                unread = Some(format!("{error}; this file is not read as marks."));
+                continue;
+            }
         };
         let writable = is_ours(&bytes);
         let other = if is_named { &spare } else { &own };
@@ -91,7 +94,28 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
             note,
         });
     }
-    Ok(Opened { label: None, marks: Marks::default(), path: own, found: None, note: None })
+    Ok(Opened { label: None, marks: Marks::default(), path: own, found: None, note: unread })
+}
+
+/// The bytes of a file and the objects in it; `None` without a file, and for another text that was not named.
+fn read(path: &Path, is_named: bool, facts: &ImageFacts) -> Result<Option<(Vec<u8>, Vec<Annotation>)>> {
+    let Some(bytes) = read_if_there(path)? else { return Ok(None) };
+    let format = AnnotationFormat::of(&bytes);
+    // The text of a picture without the part is empty.
+    if !is_named && format != Ok(AnnotationFormat::YoloPose) {
+        return Ok(None);
+    }
+    let second = match format {
+        Ok(AnnotationFormat::YoloPose) => data_yaml_of(path),
+        Ok(AnnotationFormat::OpenDr) => other_npy_of(path),
+        _ => None,
+    };
+    let second = second.map(|path| read_if_there(&path)).transpose()?.flatten();
+    match Annotation::read_with(&bytes, second.as_deref(), facts) {
+        Ok(objects) => Ok(Some((bytes, objects))),
+        Err(sdg_demonstration::Error::NoObject { .. }) => Ok(Some((bytes, Vec::new()))),
+        Err(source) => Err(Error::Demonstration { name: path.display().to_string(), source }),
+    }
 }
 
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
@@ -136,15 +160,20 @@ fn is_ours(bytes: &[u8]) -> bool {
             only_known(object, &ANNOTATION)
                 && object.get("attributes").is_none_or(|a| only_known(a, &["jaw_width", "grasp_offset"]))
         })
-        && items("categories").all(|category| only_known(category, &["id", "name", "keypoints", "skeleton"]))
+        && items("categories").all(|category| {
+            only_known(category, &["id", "name", "keypoints", "skeleton"])
+                && category.get("keypoints").is_none_or(|names| *names == json!(["grasp_start", "grasp_end"]))
+        })
 }
 
-/// Writes the marks atomically. If nothing is marked and no file exists, creates no file and returns `false`.
+/// Writes the marks atomically. If nothing is marked, no file exists and the picture had no marks when it was opened
+/// (`was_marked`), creates no file and returns `false`. Marks in a file that is only read return unless an empty file
+/// precedes it.
 ///
 /// # Errors
 /// The marks are unsuitable for teaching, or the file cannot be written.
-pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2]) -> Result<bool> {
-    if !marks.has_object() && !path.exists() {
+pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2], was_marked: bool) -> Result<bool> {
+    if !marks.has_object() && !was_marked && !path.exists() {
         return Ok(false);
     }
     let facts = ImageFacts { width: size[0], height: size[1], file_name: Some(picture) };
@@ -174,14 +203,14 @@ mod tests {
         let picture = folder.path().join("photo.png");
         let before = open(&picture, None, SIZE).unwrap();
         assert_eq!((before.marks, &before.path), (Marks::default(), &folder.path().join("photo.json")));
-        assert!(!save(&before.path, &Marks::default(), "bar", "photo.png", SIZE).unwrap());
+        assert!(!save(&before.path, &Marks::default(), "bar", "photo.png", SIZE, false).unwrap());
         assert!(!before.path.exists(), "nothing marked leaves no file behind");
-        assert!(save(&before.path, &marks(), "bar", "photo.png", SIZE).unwrap());
+        assert!(save(&before.path, &marks(), "bar", "photo.png", SIZE, false).unwrap());
         let after = open(&picture, None, SIZE).unwrap();
         assert_eq!((after.label.as_deref(), &after.marks), (Some("bar"), &marks()));
         assert_eq!((after.path, after.note), (before.path.clone(), None));
         // Clearing the marks also clears the file.
-        assert!(save(&before.path, &Marks::default(), "bar", "photo.png", SIZE).unwrap());
+        assert!(save(&before.path, &Marks::default(), "bar", "photo.png", SIZE, false).unwrap());
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, Marks::default());
     }
 
@@ -196,7 +225,7 @@ mod tests {
         assert_eq!(opened.marks.bbox, Some([10.0, 20.0, 110.0, 60.0]));
         assert_eq!(opened.path, folder.path().join("photo.coco.json"));
         assert!(opened.note.as_ref().unwrap().contains("photo.json is kept unchanged"), "{opened:?}");
-        save(&opened.path, &marks(), "bar", "photo.png", SIZE).unwrap();
+        save(&opened.path, &marks(), "bar", "photo.png", SIZE, true).unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("photo.json")).unwrap(), labelme);
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks(), "the newer file is the one that counts");
     }
@@ -218,12 +247,29 @@ mod tests {
             assert_eq!(opened.path, at("images/photo.json"));
             assert!(opened.note.unwrap().contains("photo.txt is kept unchanged; changes go to photo.json"));
         }
-        save(&at("images/photo.json"), &marks(), "bar", "photo.png", SIZE).unwrap();
+        save(&at("images/photo.json"), &marks(), "bar", "photo.png", SIZE, true).unwrap();
         assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks());
-        // The labels of a picture without the part, and another text.
-        for text in ["", "photo of the first part\n"] {
+        // If all marks are removed, those of the text do not return.
+        fs::remove_file(at("images/photo.json")).unwrap();
+        assert!(save(&at("images/photo.json"), &Marks::default(), "bar", "photo.png", SIZE, true).unwrap());
+        assert_eq!(open(&picture, None, SIZE).unwrap().marks, Marks::default());
+        // The labels of a picture without the part, another text, and numbers that are no marks: a time with a figure,
+        // and an oriented box.
+        for (text, is_told) in [
+            ("", false),
+            ("photo of the first part\n", false),
+            ("1699999999 3.2\n", true),
+            ("0 0.1 0.1 0.4 0.1 0.4 0.4 0.1 0.4\n", true),
+        ] {
             fs::write(at("labels/other.txt"), text).unwrap();
-            assert_eq!(open(&at("images/other.png"), None, SIZE).unwrap().found, None, "{text}");
+            let opened = open(&at("images/other.png"), None, SIZE).unwrap();
+            assert_eq!((opened.found, opened.marks), (None, Marks::default()), "{text}");
+            assert_eq!(opened.note.is_some_and(|note| note.contains("other.txt")), is_told, "{text}");
+        }
+        // Of unnamed texts, only those with a grasp make a picture of a folder a photo.
+        for (row, is_of_photo) in [("1 0.3 0.4 0.4 0.4", false), ("1 0.3 0.4 0.4 0.4 0.2 0.4 2 0.4 0.4 2", true)] {
+            fs::write(at("labels/other.txt"), row).unwrap();
+            assert_eq!(open(&at("images/other.png"), None, SIZE).unwrap().is_of_photo(), is_of_photo, "{row}");
         }
     }
 
@@ -231,9 +277,11 @@ mod tests {
     fn a_coco_file_with_more_than_we_write_is_left_alone() {
         let text = marks().to_coco("bar", &ImageFacts { width: 200, height: 100, file_name: Some("p.png") }).unwrap();
         assert!(is_ours(text.as_bytes()));
-        for (field, more) in
-            [("\"iscrowd\"", "\"track_id\": 3, \"iscrowd\""), ("\"images\"", "\"info\": {}, \"images\"")]
-        {
+        for (field, more) in [
+            ("\"iscrowd\"", "\"track_id\": 3, \"iscrowd\""),
+            ("\"images\"", "\"info\": {}, \"images\""),
+            ("\"grasp_start\"", "\"tip\", \"grasp_start\""),
+        ] {
             assert!(!is_ours(text.replacen(field, more, 1).as_bytes()), "{field}");
         }
     }

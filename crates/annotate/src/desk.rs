@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result, TeacherError};
 use crate::model_versions::fingerprint;
-use crate::names::{file_name, safe_stem};
+use crate::names::{absolute, file_name, safe_stem};
 use crate::picture::Picture;
 use crate::project_file::label_of;
 use crate::recent::{RecentProject, RecentProjects};
@@ -163,17 +163,14 @@ impl Start {
     }
 
     fn view(&self) -> StartView {
-        let shown = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
+        let shown = |path: &Path| absolute(path).display().to_string();
         let recent = self.recent_projects().into_iter().map(|project| RecentView {
             id: id_of(&project),
             name: label_of(&project.path).unwrap_or_else(|| file_name(&project.path)),
             path: shown(&project.path),
             opened_secs: project.opened_secs,
         });
-        StartView {
-            recent: recent.collect(),
-            folder: shown(if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder }),
-        }
+        StartView { recent: recent.collect(), folder: shown(&self.folder) }
     }
 }
 

@@ -42,7 +42,7 @@ pub enum Error {
     #[error("{name}: expected a file of its own for the marks, found {}, the file of {other}", path.display())]
     SharedMarks { name: String, path: PathBuf, other: String },
     /// No picture of that number.
-    #[error("expected a picture numbered below {count}, found {id}")]
+    #[error("expected a picture numbered below {count} that is still there, found {id}")]
     NoSuchPicture { id: usize, count: usize },
     /// No version of that number.
     #[error("expected a version of the model numbered below {count}, found {id}")]

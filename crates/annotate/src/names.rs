@@ -16,14 +16,15 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The name of a path in a project's file: relative to the folder if it is inside.
+/// The name of a path in a project's file: relative to the folder if it is inside, otherwise absolute.
 pub fn relative(folder: &Path, path: &Path) -> String {
-    let inside: PathBuf = path.strip_prefix(folder).map_or_else(|_| absolute(path), Path::to_owned);
-    inside.to_string_lossy().into_owned()
+    let (folder, path) = (absolute(folder), absolute(path));
+    path.strip_prefix(&folder).unwrap_or(&path).to_string_lossy().into_owned()
 }
 
-/// The absolute path, for comparisons.
+/// The absolute path, for comparisons; that of an empty path is the current folder.
 pub fn absolute(path: &Path) -> PathBuf {
+    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
@@ -117,7 +118,7 @@ pub fn free_numbered_except(path: &Path, names: &[String]) -> PathBuf {
     (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 
-/// Names that cameras and people give to any picture.
+/// Names that cameras and people give to any picture, also in ../page/start.js.
 const ANY_PICTURE: [&str; 14] = [
     "photo",
     "image",
@@ -143,10 +144,8 @@ pub fn proposed_label(photo: Option<&Path>, folder: &Path) -> String {
         !letters.is_empty() && !ANY_PICTURE.contains(&letters.as_str()) && !name.starts_with('.')
     };
     let of_photo = photo.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
-    // The current folder has no name of its own.
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let absolute = std::path::absolute(folder).unwrap_or_default();
-    let of_folder = || absolute.file_name().map(|name| name.to_string_lossy().into_owned());
+    let folder = absolute(folder);
+    let of_folder = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let proposed = of_photo.filter(says_something).or_else(|| of_folder().filter(says_something));
     proposed.map_or_else(|| "part".to_owned(), |name| name.chars().take(60).collect())
 }
@@ -163,6 +162,26 @@ mod tests {
         assert_eq!(safe_stem("Bu\u{308}gel"), "Bu\u{308}gel");
         assert_eq!(safe_stem("…"), "part");
         assert_eq!(safe_stem(&"a".repeat(300)).len(), 60);
+    }
+
+    #[test]
+    fn a_file_has_one_name_in_a_project_however_its_path_is_spelled() {
+        let here = std::env::current_dir().unwrap();
+        let name = |folder: &str, path: &str| relative(Path::new(folder), Path::new(path));
+        for folder in ["", ".", here.to_str().unwrap()] {
+            for path in ["a.png", "./a.png", here.join("a.png").to_str().unwrap()] {
+                assert_eq!(name(folder, path), "a.png", "{path} in {folder}");
+            }
+        }
+        for folder in ["rod", "./rod/"] {
+            assert_eq!(name(folder, "./rod/tried/a.png"), "tried/a.png");
+            assert_eq!(name(folder, "a.png"), here.join("a.png").display().to_string());
+        }
+    }
+
+    #[test]
+    fn the_page_knows_the_names_of_any_picture() {
+        assert!(include_str!("../page/start.js").contains(&format!("({})?", ANY_PICTURE.join("|"))));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use image::{ImageFormat, RgbImage};
 use sdg_demonstration::{ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
 
 use crate::error::{Error, Result};
-use crate::names::{file_name, is_picture_name, natural_order};
+use crate::names::{absolute, file_name, is_picture_name, natural_order};
 
 /// Maximum size of a photo's file.
 pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
@@ -29,6 +29,11 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Whether the picture's file is at this path, in any spelling.
+    pub fn is_at(&self, path: &Path) -> bool {
+        absolute(&self.path) == absolute(path)
+    }
+
     /// Reads and decodes the file once, so that any error is reported now.
     ///
     /// # Errors
@@ -114,6 +119,12 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// The usual extension of a picture of this format; `jpg` for other bytes, which cannot be opened as a picture.
+pub fn extension_of(bytes: &[u8]) -> &'static str {
+    let format = image::guess_format(bytes).ok();
+    format.and_then(|format| format.extensions_str().first().copied()).unwrap_or("jpg")
+}
+
 /// The picture as JPEG, for the page to show.
 pub fn jpeg(image: &RgbImage) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -175,6 +186,7 @@ mod tests {
             picture.save(&path).unwrap();
             let (bytes, found) = Picture::open(&path, PixelFrame::Upright).unwrap().for_browser().unwrap();
             assert_eq!((found, bytes == fs::read(&path).unwrap()), (media_type, is_same), "{name}");
+            assert!(name.ends_with(extension_of(&fs::read(&path).unwrap())), "{name}");
             let found = image::guess_format(&bytes).unwrap().to_mime_type();
             assert_eq!(found, media_type, "{name}");
         }

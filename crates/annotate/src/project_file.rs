@@ -9,11 +9,11 @@
 //!     tried/                   pictures added on the page
 //! ```
 //! Names are relative to the project's folder for files in it. A project's folder may contain pictures that its file
-//! does not name, because they were added later: such a picture is a photo if it has marks beside it, otherwise a
-//! picture to try. In a new folder with several pictures and no marks, the user chooses the photo. A photo's own
-//! project ignores the other files of the folder.
+//! does not name, because they were added later: such a picture is a photo if it has marks beside it (in a text file:
+//! with a grasp), otherwise a picture to try; if its marks cannot be read, it is left out. In a new folder with several
+//! pictures and no marks, the user chooses the photo. A photo's own project ignores the other files of the folder.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -129,6 +129,9 @@ pub struct ProjectFile {
     pub models: Vec<Version>,
     /// Index of the version in use.
     pub current_model: Option<usize>,
+    /// Files of the marks that are not named after their photos, by the photos' names.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub marks: BTreeMap<String, String>,
     /// The searched region of pictures; `None` in files without this field: the region of the model in use applies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub searched: Option<Searched>,
@@ -181,6 +184,7 @@ impl Default for ProjectFile {
             removed: BTreeSet::new(),
             models: Vec::new(),
             current_model: None,
+            marks: BTreeMap::new(),
             searched: None,
         }
     }
@@ -206,17 +210,37 @@ impl ProjectFile {
                 if read.format != FORMAT {
                     return Err(Error::Project { path, found: format!("format {}, expected {FORMAT}", read.format) });
                 }
-                Ok(Some(read))
+                Ok(Some(read.respelled(&place.folder)))
             }
         }
     }
 
+    /// Names every picture as [`relative`] does, once. Earlier programs named a picture of the folder as it was given,
+    /// such as `./a.png`, and could list it twice.
+    fn respelled(mut self, folder: &Path) -> Self {
+        let name = |name: &String| relative(folder, &folder.join(name));
+        let mut photos = BTreeSet::new();
+        self.photos = self.photos.iter().map(name).filter(|photo| photos.insert(photo.clone())).collect();
+        self.removed = self.removed.iter().map(name).collect();
+        let mut tried = BTreeSet::new();
+        for one in std::mem::take(&mut self.tried) {
+            let one = Tried { file: name(&one.file), became: one.became.as_ref().map(name), ..one };
+            // A photo is among the pictures to try only if it was made from one of them.
+            let is_kept = one.became.is_some() || !photos.contains(&one.file);
+            if is_kept && tried.insert(one.file.clone()) {
+                self.tried.push(one);
+            }
+        }
+        self
+    }
+
     /// Reads a project's file and, for a folder, adds pictures that were added later. Missing pictures are removed and
-    /// returned separately; unreadable ones, and those beyond the maximum number of pictures to try, are not added.
+    /// returned separately; pictures that cannot be read, or whose marks cannot, and those beyond the maximum number of
+    /// pictures to try are not added.
     ///
     /// # Errors
-    /// The folder cannot be read, the file is not a project's file, or marks belong to another picture or to a photo of
-    /// a calibrated camera that an Exif orientation rotates.
+    /// The folder cannot be read, the file is not a project's file, or an Exif orientation rotates a marked photo of a
+    /// calibrated camera.
     pub fn open(place: &ProjectPlace, frame: PixelFrame) -> Result<(Self, Gone)> {
         let read = Self::read(place)?;
         let is_new = read.is_none();
@@ -263,12 +287,16 @@ impl ProjectFile {
                 continue;
             }
             let Some(picture) = gone.open(&path, frame) else { continue };
-            let is_marked = match annotation_file::open(&path, None, picture.size) {
-                Ok(opened) => opened.marks.has_object(),
-                // The marks of a photo that an Exif orientation rotates may name its upright size.
-                Err(error) => return picture.check_is_markable().and(Err(error)),
+            let is_photo = match annotation_file::open(&path, None, picture.size) {
+                Ok(opened) => opened.is_of_photo(),
+                Err(error) => {
+                    // The marks of a photo that an Exif orientation rotates may name its upright size.
+                    picture.check_is_markable()?;
+                    gone.notes.push(format!("{}: {error}; this picture is left out.", picture.name));
+                    continue;
+                }
             };
-            if is_marked {
+            if is_photo {
                 self.photos.push(name);
             } else {
                 self.tried.push(Tried { file: name, name: picture.name, absent: false, became: None });
@@ -360,6 +388,24 @@ mod tests {
         assert_eq!(gone, ["b.png"]);
         // Removed pictures stay removed, and no picture takes the place of a missing photo.
         assert_eq!((again.photos.len(), again.tried.len(), &again.tried[0]), (0, 2, &file.tried[0]));
+    }
+
+    #[test]
+    fn a_picture_of_the_folder_is_listed_once_however_its_path_was_spelled() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "b.png"] {
+            RgbImage::new(60, 40).save(folder.path().join(name)).unwrap();
+        }
+        let absolute = folder.path().join("a.png").display().to_string();
+        let tried = |file: &str| Tried { file: file.to_owned(), name: file.to_owned(), absent: false, became: None };
+        let photos = vec!["./a.png".to_owned(), absolute];
+        let file = ProjectFile { photos, tried: vec![tried("a.png"), tried("./b.png")], ..ProjectFile::default() };
+        file.write(&ProjectPlace::of_folder(folder.path())).unwrap();
+        let (file, _) = open(folder.path());
+        assert_eq!(
+            (file.photos, &file.tried[0].file, file.tried.len()),
+            (vec!["a.png".to_owned()], &"b.png".to_owned(), 1)
+        );
     }
 
     #[test]

@@ -6,14 +6,13 @@ mod folder;
 mod opening;
 mod tried;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sdg_demonstration::{Demonstration, ModelKind, PixelFrame};
-use sdg_files::WriterLock;
+use sdg_files::{FileError, WriterLock};
 use tempfile::TempDir;
 
-use crate::advice::advise;
 use crate::error::{Error, Result};
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
@@ -77,7 +76,7 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 /// A session of the page.
 ///
 /// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the
-/// lock on the teaching's model is taken, never the reverse.
+/// locks on `locks` and on the teaching's model are taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
@@ -120,6 +119,25 @@ impl Session {
         self
     }
 
+    /// Locks the marks of all photos against other processes, unless this session has locked them.
+    ///
+    /// # Errors
+    /// Another process has locked a file.
+    pub fn lock_photos(&self) -> std::result::Result<(), FileError> {
+        let state = self.state();
+        state.photos().try_for_each(|photo| self.lock_marks(&state, &photo.picture.path))
+    }
+
+    /// Locks the marks of a photo against other processes, unless this session has locked them.
+    fn lock_marks(&self, state: &State, photo: &Path) -> std::result::Result<(), FileError> {
+        let file = state.marks_file(photo).unwrap_or_else(|| photo.with_extension("json"));
+        let mut locks = self.locks();
+        if !locks.iter().any(|lock| lock.is_of(&file)) {
+            locks.extend(WriterLock::take(&file)?);
+        }
+        Ok(())
+    }
+
     fn locks(&self) -> MutexGuard<'_, Vec<WriterLock>> {
         self.locks.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -146,7 +164,6 @@ impl Session {
             images: state.image_ids().map(|id| state.image_view(id)).collect(),
             shown: state.image_ids().position(|id| id == self.shown).unwrap_or(0),
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
-            model_path: self.model_path(&state).display().to_string(),
             models: state.model_views(),
             region: state.region,
             is_calibrated: state.max_opening_px.is_some(),
@@ -320,6 +337,7 @@ impl Session {
         // The lock is held until the photo is written, so that the next photo gets another name.
         let mut state = self.state();
         let path = self.next_photo()?;
+        self.lock_marks(&state, &path)?;
         sdg_files::write_atomically(&path, &bytes)?;
         let size = [frame.width(), frame.height()];
         let picture = Picture { name: file_name(&path), path, size, frame: self.pixel_frame };
@@ -360,13 +378,17 @@ impl Session {
     /// An invalid request, a running teaching, or insufficient marks.
     pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
         request.check()?;
-        let request = TeachRequest { region: self.state().region, ..request };
         self.teaching.check_idle()?;
-        let demonstrations = self.demonstrations(request.model)?;
-        let (model_path, negatives, fingerprint) = {
+        // The pictures are decoded without the lock: marks that change meanwhile make the model stale.
+        let (marked, label, negatives, fingerprint, model_path, region) = {
             let state = self.state();
-            (self.model_path(&state), state.negatives().cloned().collect::<Vec<_>>(), state.material())
+            let negatives: Vec<_> = state.negatives().cloned().collect();
+            let label = state.label.clone();
+            let model_path = self.model_path(&state);
+            (state.demonstrated(request.model)?, label, negatives, state.material(), model_path, state.region)
         };
+        let request = TeachRequest { region, ..request };
+        let demonstrations = marked.iter().map(|image| image.demonstration(&label)).collect::<Result<Vec<_>>>()?;
         let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
         let [photos, num_negatives] = [demonstrations.len(), negatives.len()];
         let material = TeachingMaterial { demonstrations, negatives };
@@ -422,24 +444,10 @@ impl Session {
     /// # Errors
     /// No picture is marked, or a picture has marks but lacks some that `model` needs.
     pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
-        let (label, marked, max_opening_px) = {
+        let (label, marked) = {
             let state = self.state();
-            let marked: Vec<_> = state.image_ids().map(|id| state.images[id].clone()).collect();
-            (state.label.clone(), marked, state.max_opening_px)
+            (state.label.clone(), state.demonstrated(model)?)
         };
-        let begun: Vec<_> = marked.iter().filter(|image| image.marks != Marks::default()).collect();
-        if begun.is_empty() {
-            let name = marked.first().map_or_else(|| "no photo yet".to_owned(), |image| image.picture.name.clone());
-            return Err(Error::NotMarked { name, expected: "a box and a grasp", found: "no marks" });
-        }
-        for image in &begun {
-            let advice = advise(&image.marks, image.picture.size, max_opening_px);
-            let lacks = advice.models.iter().find(|advice| advice.model == model).map(|advice| &advice.lacks);
-            if let Some(&missing) = lacks.and_then(|lacks| lacks.first()) {
-                let name = image.picture.name.clone();
-                return Err(Error::NotMarked { name, expected: missing, found: "none" });
-            }
-        }
-        begun.into_iter().map(|image| image.demonstration(&label)).collect()
+        marked.iter().map(|image| image.demonstration(&label)).collect()
     }
 }

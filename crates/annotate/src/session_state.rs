@@ -1,9 +1,9 @@
 //! The state of a session: the object's name, its pictures with their marks, and the pictures to try.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts, PixelFrame};
+use sdg_demonstration::{Annotation, Demonstration, ImageFacts, ModelKind};
 use serde_json::Value;
 
 use crate::advice::advise;
@@ -35,6 +35,8 @@ pub struct State {
     pub removed_earlier: BTreeSet<String>,
     /// Missing files named in the project's file; they may reappear.
     pub gone: Gone,
+    /// Files of marks that are not named after their photos, as [`ProjectFile::marks`].
+    pub marks_files: BTreeMap<String, String>,
     /// Pictures of the project's folder that were offered, in the order of their first listing: [`State::others`].
     pub offered: Vec<PathBuf>,
     /// The hand's maximum opening in pixels, if a calibrated camera gives it.
@@ -53,6 +55,8 @@ pub struct MarkedPicture {
     pub file: PathBuf,
     pub note: Option<String>,
     pub saved: Saved,
+    /// Whether a file had marks of it when it was opened.
+    pub was_marked: bool,
     pub is_removed: bool,
 }
 
@@ -105,7 +109,7 @@ impl State {
                 return Err(Error::Busy("this picture is a demonstration already"));
             }
             Some(removed) => MarkedPicture { is_removed: false, ..removed.clone() },
-            None => MarkedPicture::of(picture, None)?.0,
+            None => self.open_photo(picture)?.0,
         };
         image.check_file(self.photos())?;
         if image.marks.has_object() && (image.marks.grasp.is_some() || marks.grasp.is_none()) {
@@ -124,9 +128,25 @@ impl State {
         Ok(id)
     }
 
+    /// Opens a photo with its marks, which may be in a file that the project names; also gives the object's name in
+    /// that file.
+    ///
+    /// # Errors
+    /// As [`MarkedPicture::of`].
+    pub fn open_photo(&self, picture: Picture) -> Result<(MarkedPicture, Option<String>)> {
+        let file = self.marks_file(&picture.path);
+        MarkedPicture::of(picture, file.as_deref())
+    }
+
+    /// The file of a photo's marks that is not named after the photo.
+    pub fn marks_file(&self, photo: &Path) -> Option<PathBuf> {
+        let folder = &self.place.as_ref()?.folder;
+        self.marks_files.get(&relative(folder, photo)).map(|file| folder.join(file))
+    }
+
     pub fn save(&mut self, id: usize) {
-        let MarkedPicture { picture, marks, file, .. } = &self.images[id];
-        let written = annotation_file::save(file, marks, &self.label, &picture.name, picture.size);
+        let MarkedPicture { picture, marks, file, was_marked, .. } = &self.images[id];
+        let written = annotation_file::save(file, marks, &self.label, &picture.name, picture.size, *was_marked);
         self.images[id].saved = match written {
             Ok(true) => Saved::Written { file: file_name(&self.images[id].file) },
             Ok(false) => Saved::Nothing,
@@ -163,6 +183,27 @@ impl State {
     /// Numbers of the pictures to try that are not removed.
     pub fn trial_ids(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.trial_pictures.len()).filter(|&id| !self.trial_pictures[id].is_removed)
+    }
+
+    /// The photos for teaching `model`. Pictures without any mark are left out.
+    ///
+    /// # Errors
+    /// No picture is marked, or a picture has marks but lacks some that `model` needs.
+    pub fn demonstrated(&self, model: ModelKind) -> Result<Vec<MarkedPicture>> {
+        let marked: Vec<_> = self.photos().filter(|image| image.marks != Marks::default()).cloned().collect();
+        if marked.is_empty() {
+            let first = self.photos().next();
+            let name = first.map_or_else(|| "no photo yet".to_owned(), |image| image.picture.name.clone());
+            return Err(Error::NotMarked { name, expected: "a box and a grasp", found: "no marks" });
+        }
+        for MarkedPicture { picture, marks, .. } in &marked {
+            let advice = advise(marks, picture.size, self.max_opening_px);
+            let lacks = advice.models.iter().find(|advice| advice.model == model).map(|advice| &advice.lacks);
+            if let Some(&missing) = lacks.and_then(|lacks| lacks.first()) {
+                return Err(Error::NotMarked { name: picture.name.clone(), expected: missing, found: "none" });
+            }
+        }
+        Ok(marked)
     }
 
     /// Pictures without the part.
@@ -216,6 +257,7 @@ impl State {
             removed: self.removed_earlier.clone(),
             models: self.models.versions.clone(),
             current_model: self.models.current,
+            marks: self.marks_files.clone(),
             searched: Some(Searched::of(self.region)),
             ..ProjectFile::default()
         };
@@ -256,19 +298,11 @@ fn round(value: &mut Value) {
 impl MarkedPicture {
     /// A picture with marks that are in no file.
     pub fn unsaved(picture: Picture, marks: Marks) -> Self {
-        Self { picture, marks, file: PathBuf::new(), note: None, saved: Saved::Nothing, is_removed: false }
+        let (file, saved) = (PathBuf::new(), Saved::Nothing);
+        Self { picture, marks, file, note: None, saved, was_marked: false, is_removed: false }
     }
 
-    /// A picture with the marks in the file beside it, and the object's name in that file.
-    ///
-    /// # Errors
-    /// The picture cannot be read, or the errors of [`of`](Self::of).
-    pub fn open(path: &Path, frame: PixelFrame) -> Result<(Self, Option<String>)> {
-        Self::of(Picture::open(path, frame)?, None)
-    }
-
-    /// As [`open`](Self::open), for a picture that has been read; `annotation` is the file of the marks if it is not
-    /// named after the picture.
+    /// A picture with the marks in the file beside it, or in `annotation`, and the object's name in that file.
     ///
     /// # Errors
     /// The marks belong to another picture, or an Exif orientation rotates a photo of a calibrated camera.
@@ -277,10 +311,10 @@ impl MarkedPicture {
         let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
         // The file that was read, not the file for changes, which may not exist yet.
         let found = opened.found.filter(|_| opened.marks.has_object());
+        let was_marked = found.is_some();
         let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
-        let marked =
-            Self { picture, marks: opened.marks, file: opened.path, note: opened.note, saved, is_removed: false };
-        Ok((marked, opened.label))
+        let (marks, file, note) = (opened.marks, opened.path, opened.note);
+        Ok((Self { picture, marks, file, note, saved, was_marked, is_removed: false }, opened.label))
     }
 
     /// Checks that no other photo has its marks in the same file, as `part.png` and `part.jpg` would.

@@ -142,8 +142,6 @@ pub struct SessionView {
     pub shown: usize,
     /// Pictures to try.
     pub trial_pictures: Vec<TrialPictureView>,
-    /// File for a taught model.
-    pub model_path: String,
     /// Versions of the model, oldest first.
     pub models: Vec<ModelView>,
     /// The searched region; `None` for the whole picture.

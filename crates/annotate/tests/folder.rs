@@ -111,6 +111,58 @@ fn unreadable_pictures_of_a_folder_are_left_out_with_a_note() {
 }
 
 #[test]
+fn no_file_beside_a_picture_keeps_the_project_from_opening() {
+    let folder = folder_of(&["rod.png", "broken.png", "boxes.png", "times.png"]);
+    for (name, text) in [
+        ("rod.json", LABELME),
+        ("broken.json", "{"),
+        ("boxes.txt", "0 0.5 0.5 0.2 0.2\n"),
+        ("times.txt", "1699999999 3.2\n"),
+    ] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let first = session(&Served::of_project(folder));
+    let expected = (vec!["rod.png"], vec!["boxes.png", "times.png"]);
+    assert_eq!((names(&first["images"]), names(&first["trial_pictures"])), expected);
+    let note = first["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("broken.png: ") && note.contains("broken.json"), "{}", first["notes"]);
+    assert_eq!(first["notes"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn the_file_of_a_photo_s_marks_is_recorded() {
+    let folder = folder_of(&["rod.png", "other.png"]);
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("marked.json"), LABELME).unwrap();
+    let given = vec![(at("rod.png"), None), (at("other.png"), Some(at("marked.json")))];
+    for images in [given, vec![(at("rod.png"), None)]] {
+        let options = SessionOptions { images, ..SessionOptions::default() };
+        let view = Session::open(&options, Arc::new(InPlace)).unwrap().view();
+        assert_eq!(view.images[1].marks.bbox, Some([40.0, 40.0, 140.0, 60.0]));
+    }
+}
+
+#[test]
+fn marks_that_were_removed_do_not_return_from_a_file_that_is_only_read() {
+    let folder = folder_of(&["rod.png"]);
+    std::fs::write(folder.path().join("rod.txt"), "0 0.5 0.5 0.5 0.2\n").unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    let has_box = |served: &Served| session(served)["images"][0]["marks"]["box"].is_array();
+    assert!(has_box(&served));
+    served.ask("PUT", "/api/images/0/marks", b"{}").json();
+    assert!(!has_box(&Served::of_photo(served.end(), "rod.png")));
+}
+
+#[test]
+fn a_picture_from_the_page_is_named_by_its_format() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    photo().write_to(&mut bytes, image::ImageFormat::Bmp).unwrap();
+    served.ask("POST", "/api/trial-pictures?name=table.png", bytes.get_ref()).json();
+    assert!(served.folder.path().join("tried/table.bmp").exists());
+}
+
+#[test]
 fn a_given_picture_that_is_unreadable_is_refused() {
     let folder = folder_of(&["rod.png"]);
     let cut = folder.path().join("cut.png");
@@ -373,7 +425,8 @@ fn in_a_new_folder_the_photo_is_chosen_and_others_are_added_and_removed() {
 #[test]
 fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
     let served = Served::of_photo(folder_of(&["rod.png", "other.png", "second.png"]), "rod.png");
-    let files = || std::fs::read_dir(served.folder.path()).unwrap().count();
+    let is_hidden = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with('.');
+    let files = || std::fs::read_dir(served.folder.path()).unwrap().flatten().filter(|file| !is_hidden(file)).count();
     let before = files();
     let tried = served.ask("POST", "/api/trial-pictures?name=other.png", &photo_png()).json();
     assert_eq!(tried["name"], "other.png");
@@ -381,7 +434,7 @@ fn a_picture_of_the_folder_chosen_as_a_file_is_used_without_a_copy() {
     let photo = served.ask("POST", "/api/images?name=second.png", &photo_png()).json();
     assert_eq!(photo["name"], "second.png");
     assert_eq!(session(&served)["others"], json!([]));
-    // The project's file and no copies.
+    // The project's file and no copies; locks are hidden files.
     assert_eq!(files(), before + 1);
     // Another picture of the same name is copied.
     std::fs::write(served.folder.path().join("third.png"), b"another content").unwrap();

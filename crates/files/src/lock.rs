@@ -62,8 +62,7 @@ impl WriterLock {
     /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if the holder's name cannot be
     /// written.
     pub fn take(written: &Path) -> Result<Option<Self>> {
-        let name = written.file_name().unwrap_or_default().to_string_lossy();
-        let path = written.with_file_name(format!(".{name}.lock"));
+        let path = lock_file_of(written);
         loop {
             let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
             let Ok(file) = file else { return Ok(None) };
@@ -86,6 +85,18 @@ impl WriterLock {
             }
         }
     }
+
+    /// Whether this is the lock of a file, in any spelling of its path.
+    pub fn is_of(&self, written: &Path) -> bool {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        absolute(&self.path) == absolute(&lock_file_of(written))
+    }
+}
+
+/// The hidden file beside a file that carries its lock.
+fn lock_file_of(written: &Path) -> PathBuf {
+    let name = written.file_name().unwrap_or_default().to_string_lossy();
+    written.with_file_name(format!(".{name}.lock"))
 }
 
 impl Drop for WriterLock {
@@ -135,6 +146,7 @@ mod tests {
         let marks = folder.path().join("part.json");
         let file = folder.path().join(".part.json.lock");
         let held = WriterLock::take(&marks).unwrap();
+        assert!(held.as_ref().unwrap().is_of(&marks) && !held.as_ref().unwrap().is_of(&folder.path().join("b.json")));
         let error = WriterLock::take(&marks).err().unwrap();
         let process = format!("process {}", std::process::id());
         assert!(matches!(&error, FileError::Held { path, holder } if *path == marks && *holder == process), "{error}");

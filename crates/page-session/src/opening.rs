@@ -81,7 +81,10 @@ pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
 fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
     let (max_opening_px, pixel_frame) = (teacher.max_opening_px(), teacher.pixel_frame());
     let options = SessionOptions { max_opening_px, pixel_frame, ..options };
-    Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
+    let session = Session::open(&options, Arc::new(teacher.clone()))?.holding(locks);
+    // The project may name further photos.
+    session.lock_photos().map_err(refused)?;
+    Ok(session)
 }
 
 /// Locks files against other processes, each once. Files in a folder that is not writable are not locked.
@@ -93,13 +96,18 @@ fn lock_all(written: impl Iterator<Item = PathBuf>) -> Result<Vec<WriterLock>> {
 
 /// Locks a file against other processes; `None` if the folder is not writable.
 fn lock(written: &Path) -> Result<Option<WriterLock>> {
-    WriterLock::take(written).map_err(|error| match error {
+    WriterLock::take(written).map_err(refused)
+}
+
+/// The error of a lock.
+fn refused(error: FileError) -> anyhow::Error {
+    match error {
         FileError::Held { path, holder } => anyhow!(
             "{}: another `sdg annotate` ({holder}) is editing these marks; continue on its page, or stop it first",
             path.display()
         ),
         error => error.into(),
-    })
+    }
 }
 
 #[cfg(test)]
@@ -109,6 +117,33 @@ mod tests {
     use image::{ImageEncoder, RgbImage};
     use sdg_grasp::Preset;
     use sdg_inputs::camera_files::CameraFile;
+
+    #[test]
+    fn photos_of_a_project_are_locked_and_those_added_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["a.png", "b.png", "c.png"] {
+            RgbImage::new(60, 40).save(at(name)).unwrap();
+        }
+        let project = r#"{"format": 1, "label": null, "photos": ["a.png", "b.png"], "tried": [], "removed": [],
+            "models": [], "current_model": null}"#;
+        std::fs::write(at("a.sdg-project.json"), project).unwrap();
+        let teacher = PageTeacher { preset: Preset::default(), camera: None };
+        let open = |name: &str| open_chosen(&teacher, &at(name)).map_err(|error| error.to_string());
+        let session = open("a.png").unwrap();
+        let is_refused = |name: &str| open(name).is_err_and(|error| error.contains("is editing these marks"));
+        assert!(is_refused("b.png") && !is_refused("c.png"));
+        let other = session.view().others[0].id;
+        session.add_photo(other).unwrap();
+        assert!(is_refused("c.png"));
+        // A photo that is removed and added again is locked already.
+        let added = session.view().images[2].id;
+        session.remove_image(added).unwrap();
+        session.view();
+        session.add_photo(other).unwrap();
+        drop(session);
+        assert!(!is_refused("b.png"));
+    }
 
     #[test]
     fn a_project_with_a_rotated_photo_of_a_calibrated_camera_is_refused() {

@@ -1,5 +1,6 @@
 //! JSON bodies of requests, and responses shared by all addresses.
 
+use sdg_files::FileError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
@@ -46,7 +47,11 @@ fn refusal(error: &Error) -> Response {
         | Error::SharedMarks { .. }
         | Error::Request { .. }
         | Error::Teacher(_) => 422,
-        Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } | Error::Camera { .. } => 409,
+        Error::Busy(_)
+        | Error::NotTaught
+        | Error::TooManyPictures { .. }
+        | Error::Camera { .. }
+        | Error::Write(FileError::Held { .. }) => 409,
         Error::TooLarge { .. } => 413,
         _ => 500,
     };

@@ -1,10 +1,11 @@
 //! The other pictures of a project's folder, which the user can add, and photos added on the page.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::Session;
 use crate::error::{Error, Result};
-use crate::names::{file_name, free_name};
+use crate::names::{absolute, file_name, free_name};
 use crate::picture::{Picture, pictures_in};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::views::{ImageView, OtherView, TrialPictureView};
@@ -16,11 +17,11 @@ impl State {
     /// The pictures of the project's folder that are not in the project. Their numbers are fixed for the session.
     pub fn others(&mut self) -> Vec<OtherView> {
         let Some(place) = &self.place else { return Vec::new() };
-        let listed = if place.folder.as_os_str().is_empty() { Path::new(".") } else { &place.folder };
+        let known = self.known_paths();
         // A folder that cannot be listed offers nothing; the error is reported when it is written to.
-        for path in pictures_in(listed).unwrap_or_default() {
+        for path in pictures_in(&absolute(&place.folder)).unwrap_or_default() {
             let path = place.folder.join(path.file_name().unwrap_or_default());
-            if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) && self.is_other(&path) {
+            if self.offered.len() < MAX_OFFERED && !self.offered.contains(&path) && is_other(&known, &path) {
                 self.offered.push(path);
             }
         }
@@ -29,13 +30,14 @@ impl State {
             let is_tried = self.is_tried_copy(path, &name);
             OtherView { id, name, is_tried }
         };
-        self.offered.iter().enumerate().filter(|(_, path)| self.is_other(path)).map(view).collect()
+        self.offered.iter().enumerate().filter(|(_, path)| is_other(&known, path)).map(view).collect()
     }
 
-    fn is_other(&self, path: &Path) -> bool {
-        let is_photo = self.image_ids().any(|id| self.images[id].picture.path == path);
-        let is_tried = self.trial_ids().any(|id| self.trial_pictures[id].picture.path == path);
-        !is_photo && !is_tried && path.is_file()
+    /// The absolute paths of the session's pictures.
+    fn known_paths(&self) -> BTreeSet<PathBuf> {
+        let photos = self.photos().map(|image| &image.picture);
+        let tried = self.trial_ids().map(|id| &self.trial_pictures[id].picture);
+        photos.chain(tried).map(|picture| absolute(&picture.path)).collect()
     }
 
     /// Whether this file is a copy of a picture to try. A picture from elsewhere is copied into the folder when it
@@ -43,15 +45,20 @@ impl State {
     /// recognised only by its name and content.
     fn is_tried_copy(&self, path: &Path, name: &str) -> bool {
         self.trial_ids().map(|id| &self.trial_pictures[id]).any(|trial| {
-            let is_copied = trial.became.is_some_and(|id| self.images[id].picture.path == path);
+            let is_copied = trial.became.is_some_and(|id| self.images[id].picture.is_at(path));
             is_copied || (trial.picture.name == name && is_same_file(&trial.picture.path, path))
         })
     }
 
     fn other(&self, id: usize) -> Result<&Path> {
-        let there = self.offered.get(id).filter(|path| self.is_other(path));
+        let there = self.offered.get(id).filter(|path| is_other(&self.known_paths(), path));
         there.map(PathBuf::as_path).ok_or(Error::NoSuchPicture { id, count: self.offered.len() })
     }
+}
+
+/// Whether a file exists and is not among the session's pictures, which are known by their absolute paths.
+fn is_other(known: &BTreeSet<PathBuf>, path: &Path) -> bool {
+    !known.contains(&absolute(path)) && path.is_file()
 }
 
 /// Whether two files can be read and have the same content.
@@ -82,22 +89,24 @@ impl Session {
     /// Makes another picture of the folder a photo of the part, with the marks beside it.
     ///
     /// # Errors
-    /// Unknown picture, marks of another picture or in another photo's file, a photo of a calibrated camera that an Exif
-    /// orientation rotates, or the project cannot be written.
+    /// Unknown picture, marks of another picture or in another photo's file, marks that another process has locked, a
+    /// photo of a calibrated camera that an Exif orientation rotates, or the project cannot be written.
     pub fn add_photo(&self, id: usize) -> Result<ImageView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
         // A photo that was removed and is added again keeps its number.
-        let known = state.images.iter().position(|image| image.picture.path == path);
+        let known = state.images.iter().position(|image| image.picture.is_at(&path));
         let id = match known {
             Some(id) => {
                 state.images[id].check_file(state.photos())?;
+                self.lock_marks(&state, &path)?;
                 state.images[id].is_removed = false;
                 id
             }
             None => {
-                let (image, label) = MarkedPicture::open(&path, self.pixel_frame)?;
+                let (image, label) = state.open_photo(Picture::open(&path, self.pixel_frame)?)?;
                 image.check_file(state.photos())?;
+                self.lock_marks(&state, &path)?;
                 if let Some(label) = label.filter(|_| !state.is_named) {
                     (state.label, state.is_named) = (label, true);
                 }
@@ -117,7 +126,7 @@ impl Session {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
         state.check_room()?;
-        let known = state.trial_pictures.iter().position(|trial| trial.picture.path == path);
+        let known = state.trial_pictures.iter().position(|trial| trial.picture.is_at(&path));
         let id = match known {
             Some(id) => {
                 state.trial_pictures[id].is_removed = false;
@@ -147,8 +156,9 @@ impl Session {
         let extension = Path::new(shown).extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let mut state = self.state();
         let path = free_name(&self.home, shown, if extension.is_empty() { "png" } else { &extension });
+        self.lock_marks(&state, &path)?;
         sdg_files::write_atomically(&path, bytes)?;
-        let (image, _) = MarkedPicture::open(&path, self.pixel_frame)?;
+        let (image, _) = MarkedPicture::of(Picture::open(&path, self.pixel_frame)?, None)?;
         state.images.push(image);
         let id = state.images.len() - 1;
         self.settle_place(&mut state, id)?;

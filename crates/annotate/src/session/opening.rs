@@ -1,5 +1,6 @@
 //! Opening a session: the project in its last state, the given pictures, and the model in use.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -37,9 +38,14 @@ impl Session {
         };
         let folder = place.as_ref().map_or(Path::new(""), |place| &place.folder).to_owned();
         let mut photos = options.images.clone();
-        for name in &project.photos {
-            if !photos.iter().any(|(path, _)| relative(&folder, path) == *name) {
-                photos.push((folder.join(name), None));
+        photos.extend(project.photos.iter().map(|name| (folder.join(name), None)));
+        // A picture with two spellings of its path is one photo.
+        let mut names = BTreeSet::new();
+        photos.retain(|(path, _)| names.insert(relative(&folder, path)));
+        let mut marks_files = project.marks.clone();
+        for (path, marks) in &options.images {
+            if let Some(marks) = marks {
+                marks_files.insert(relative(&folder, path), relative(&folder, marks));
             }
         }
         let first = photos.first().map(|(path, _)| path.clone());
@@ -50,12 +56,14 @@ impl Session {
         };
         let mut label = project.label.clone();
         let mut images = Vec::new();
-        for (idx, (path, annotation)) in photos.iter().enumerate() {
-            let is_given = idx < options.images.len();
+        for (path, annotation) in &photos {
+            let is_given = options.images.iter().any(|(given, _)| given == path);
+            let name = relative(&folder, path);
+            let annotation = annotation.clone().or_else(|| marks_files.get(&name).map(|file| folder.join(file)));
             let frame = options.pixel_frame;
             let opened = if is_given { Some(Picture::open(path, frame)?) } else { gone.open(path, frame) };
             let Some(picture) = opened else {
-                gone.photos.push(relative(&folder, path));
+                gone.photos.push(name);
                 continue;
             };
             let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
@@ -64,7 +72,7 @@ impl Session {
                     return Err(error);
                 }
                 gone.leave_out(&error);
-                gone.photos.push(relative(&folder, path));
+                gone.photos.push(name);
                 continue;
             }
             label = label.take().or(named);
@@ -75,7 +83,7 @@ impl Session {
         let place_of = |image: &MarkedPicture| project.photos.iter().position(|known| *known == name(image));
         images.sort_by_key(|image| place_of(image).unwrap_or(usize::MAX));
         let given = options.images.first();
-        let shown = given.and_then(|(path, _)| images.iter().position(|image| image.picture.path == *path));
+        let shown = given.and_then(|(path, _)| images.iter().position(|image| name(image) == relative(&folder, path)));
         let trial_pictures = trial_pictures(&project, &folder, &images, options, &mut gone)?;
         let mut notes = std::mem::take(&mut gone.notes);
         let temporary = match place {
@@ -129,6 +137,7 @@ impl Session {
             place,
             removed_earlier: project.removed,
             gone,
+            marks_files,
             offered: Vec::new(),
             max_opening_px: options.max_opening_px,
             region,
@@ -204,14 +213,13 @@ fn trial_pictures(
         let became = tried.became.as_ref().and_then(|photo| images.iter().position(|image| is(photo, image)));
         trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
     }
+    let pictures = images.iter().map(|image| &image.picture).chain(trial_pictures.iter().map(|trial| &trial.picture));
+    let mut taken: BTreeSet<_> = pictures.map(|picture| relative(folder, &picture.path)).collect();
     for path in &options.trial_pictures {
         let is_folder = path.is_dir();
         let paths = if is_folder { pictures_in(path)? } else { vec![path.clone()] };
         for path in paths {
-            let is = |known: &Path| relative(folder, known) == relative(folder, &path);
-            let taken = images.iter().any(|image| is(&image.picture.path))
-                || trial_pictures.iter().any(|trial| is(&trial.picture.path));
-            if taken {
+            if !taken.insert(relative(folder, &path)) {
                 continue;
             }
             if trial_pictures.len() >= MAX_TRIAL_PICTURES {

@@ -9,7 +9,7 @@ use super::{MAX_LABEL_CHARS, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name};
-use crate::picture::{Picture, png};
+use crate::picture::{Picture, extension_of, png};
 use crate::project_file::MAX_TRIAL_PICTURES;
 use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
@@ -60,13 +60,12 @@ impl Session {
             return self.add_other_trial(id);
         }
         // The given name is for display; the file gets a safe, unused name.
-        let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
         let shown: String = name.chars().take(MAX_LABEL_CHARS).collect();
         // The lock is held until the picture is written, so that the next picture gets another name.
         let mut state = self.state();
         let folder = self.uploads(&state);
         std::fs::create_dir_all(&folder).map_err(Error::file(&folder, "cannot make this folder"))?;
-        let path = free_name(&folder.join("picture"), &shown, extension);
+        let path = free_name(&folder.join("picture"), &shown, extension_of(bytes));
         sdg_files::write_atomically(&path, bytes)?;
         let picture = Picture::open(&path, self.pixel_frame).map_err(|error| {
             // Invalid pictures are not kept.
@@ -203,8 +202,8 @@ impl Session {
     /// unused name: no marks are written into other folders. If the photo that it became was removed, that is restored.
     ///
     /// # Errors
-    /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo, an Exif
-    /// orientation rotates a picture of a calibrated camera, or a file cannot be written.
+    /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo or locked by
+    /// another process, an Exif orientation rotates a picture of a calibrated camera, or a file cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
@@ -224,6 +223,7 @@ impl Session {
             picture.name = file_name(&target);
             picture.path = target;
         }
+        self.lock_marks(&state, &picture.path)?;
         let id = state.add_image(picture, marks)?;
         state.trial_pictures[trial_id].became = Some(id);
         state.trial_pictures[trial_id].is_absent = false;

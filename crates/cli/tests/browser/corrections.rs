@@ -184,6 +184,48 @@ fn earlier_strokes_stay_after_an_undo_and_their_outline_after_a_reload() {
     page.assert_quiet();
 }
 
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_late_outline_is_not_that_of_a_box_undone_or_drawn_again() {
+    let page = Page::open();
+    // The requests wait until the test sends them.
+    let hold = "const ask = window.fetch; window.waiting = [];
+        window.fetch = (path, options) => !path.endsWith('/outline') ? ask(path, options)
+            : new Promise((answer) => window.waiting.push(() => answer(ask(path, options))))";
+    page.browser.run(hold, &[]).unwrap();
+    let asked = |count: usize| page.wait_for("a request", &format!("return window.waiting.length === {count}"));
+    let answer = |index: usize| {
+        page.browser.run(&format!("window.waiting[{index}]()"), &[]).unwrap();
+    };
+    page.draw_box();
+    asked(1);
+    page.browser.press(&["\u{e009}", "z"]).unwrap();
+    answer(0);
+    page.settle();
+    let left = "return ['box', 'outline'].map((mark) => document.querySelector(`#do-${mark}.done`) === null)
+        .concat(document.getElementById('redo').disabled)";
+    assert_eq!(page.browser.run(left, &[]).unwrap(), json!([true, true, false]));
+
+    // The answer for the first of two boxes is discarded, and the second one gets its own.
+    page.browser.press(&["b"]).unwrap();
+    page.draw_box();
+    asked(2);
+    page.browser.press(&["b"]).unwrap();
+    page.settle_frames();
+    let corners = [[245.0, 154.0], [320.0, 220.0], [402.0, 292.0]].map(|place| page.on_screen(place));
+    page.browser.drag(&corners).unwrap();
+    answer(1);
+    asked(3);
+    page.settle_frames();
+    assert_eq!(page.browser.run("return document.querySelector('#do-outline.done')", &[]).unwrap(), json!(null));
+    answer(2);
+    page.wait_for("its outline", "return document.querySelector('#do-outline.done') !== null");
+    let saved = page.saved();
+    assert!((saved.bbox.x1 - 245.0).abs() < 2.0 && saved.outline.is_some(), "{:?}", saved.bbox);
+    asked(3);
+    page.assert_quiet();
+}
+
 /// A light plate with a dark shadow to its lower right, on a grey table.
 fn shaded_plate() -> RgbImage {
     RgbImage::from_fn(640, 480, |x, y| {
@@ -253,6 +295,16 @@ fn a_stroke_that_takes_much_of_the_outline_is_told_and_taken_back() {
     page.browser.run("document.querySelector('#toasts button').click()", &[]).unwrap();
     page.settle();
     assert_eq!(page.saved().outline.unwrap().area(), area, "undone from the note");
+
+    // After a further step, the outline is moved with an arrow key, a note undoes nothing.
+    page.browser.drag(&stroke).unwrap();
+    page.settle();
+    page.wait_for("another note", note);
+    page.browser.press(&["\u{e014}"]).unwrap();
+    let moved = page.saved().outline;
+    page.browser.run("document.querySelector('#toasts button').click()", &[]).unwrap();
+    page.settle();
+    assert_eq!(page.saved().outline, moved);
     page.assert_quiet();
 }
 

@@ -337,7 +337,7 @@ fn unreadable_pictures_are_named_until_the_note_is_confirmed() {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
-    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["earlier", "photo"]);
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["earlier", "photo", "third"]);
     // The photo is removed, restored and removed again: the restarted server gives the other photo the number of the
     // removed one.
     for again in [true, false] {
@@ -351,6 +351,8 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
             page.wait_for("it again", "return document.getElementById('photo').alt === 'Photo earlier.png'");
         }
     }
+    let address = |page: &Page| page.browser.run("return document.getElementById('photo').src", &[]).unwrap();
+    let shown = address(&page);
     page.stop_server();
     page.wait_for("the banner", "return !document.getElementById('lost').hidden");
     page.settle_frames();
@@ -376,6 +378,10 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     let by = turned(&saved).degrees() - turned(&saved.with_file_name("photo.json")).degrees();
     assert!((by - 5.0).abs() < 0.1, "five keys turn by five degrees: {by}");
     assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
+    // The next photo has the number that this one had before; the browser must not take it for this one.
+    page.browser.press(&["n"]).unwrap();
+    page.wait_for("the next photo", "return document.getElementById('photo').alt === 'Photo third.png'");
+    assert_ne!(address(&page), shown);
     page.wait_for(
         "nothing kept any more",
         "return !Object.keys(localStorage).some((key) => key.startsWith('kept-marks'))",
@@ -389,6 +395,29 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     page.settle_frames();
     page.screenshot("project-9-another-key");
     page.assert_accessible("another key");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_photo_that_is_opened_during_a_drag_does_not_get_its_marks() {
+    let page = open(&[], &["a", "b"]);
+    let pointer = |actions: serde_json::Value| {
+        let mouse =
+            json!({"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions});
+        page.browser.perform(&json!([mouse])).unwrap();
+    };
+    let to = |[x, y]: [f64; 2]| json!({"type": "pointerMove", "duration": 20, "x": x.round(), "y": y.round()});
+    let [x, y] = page.handle("[data-edge='se'] .knob");
+    pointer(json!([to([x, y]), {"type": "pointerDown", "button": 0}, to([x - 20.0, y])]));
+    page.browser.press(&["n"]).unwrap();
+    page.settle_frames();
+    assert_eq!(page.browser.run("return document.getElementById('photo').alt", &[]).unwrap(), json!("Photo a.png"));
+    page.browser.run("document.querySelectorAll('#strip button')[1].click()", &[]).unwrap();
+    pointer(json!([to([x - 40.0, y]), {"type": "pointerUp", "button": 0}]));
+    let unchanged = "return import('/page/store.js').then(({ state }) => [state.current,
+        ...state.images.map((photo) => JSON.stringify(photo.marks) === photo.committed && !photo.past.length)])";
+    assert_eq!(page.browser.run(unchanged, &[]).unwrap(), json!([1, true, true]));
+    page.assert_quiet();
 }
 
 #[test]

@@ -96,6 +96,11 @@ fn a_photo_is_opened_again_with_its_models_and_tried_pictures() {
     open_folder(&page, "#add-others");
     page.wait_for("the folder", "return document.querySelectorAll('#folder-list img').length === 1");
     theme(&page, "folder");
+    // Escape closes the dialog; keys do not act on the photo behind it.
+    page.browser.press(&["?"]).unwrap();
+    page.browser.press(&["\u{e00c}"]).unwrap();
+    page.wait_for("no dialog", "return document.querySelector('dialog[open]') === null");
+    open_folder(&page, "#add-others");
     page.click("#folder-list button");
     page.click("#folder form button");
     patiently(&page, "an answer", "return document.getElementById('found').innerText.includes('Found the part')");
