@@ -48,6 +48,8 @@ pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(
         error.downcast_ref::<SimulationError>(),
-        Some(SimulationError::Unstable { .. } | SimulationError::MuJoCo { .. })
+        Some(
+            SimulationError::Unstable { .. } | SimulationError::TooManyContacts { .. } | SimulationError::MuJoCo { .. }
+        )
     )
 }
