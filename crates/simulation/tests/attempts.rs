@@ -198,7 +198,9 @@ fn the_same_seed_gives_the_same_attempt_and_another_start_another() {
 #[test]
 fn nothing_seen_is_a_failure_to_detect() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
-    let (step, why) = attempt(&mut cell, || None);
+    let report = cell.run_attempt(&mut Looking::new(|| None), &AttemptConfig::default(), 1).unwrap();
+    assert!(report.found_nothing);
+    let (step, why) = failure(report);
     assert_eq!((step, why.as_str()), (GraspStep::Detect, "the part was not found in 3 looks"));
 
     let mut looks = 0;
@@ -249,7 +251,10 @@ fn the_second_look_may_be_less_sure_of_what_the_first_one_saw() {
 #[test]
 fn a_part_wider_than_the_hand_is_refused() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
-    let (step, why) = attempt(&mut cell, || Some(GraspTarget { jaw_width_m: 0.095, ..true_target() }));
+    let mut wide = Looking::new(|| Some(GraspTarget { jaw_width_m: 0.095, ..true_target() }));
+    let report = cell.run_attempt(&mut wide, &AttemptConfig::default(), 1).unwrap();
+    assert!(!report.found_nothing);
+    let (step, why) = failure(report);
     assert_eq!((step, why.as_str()), (GraspStep::Detect, "the part is 95 mm wide, the hand opens 80 mm"));
 }
 
