@@ -17,7 +17,7 @@ use sdg_kinematics::ArmGeometry;
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::workcell::Workcell as WorkcellFile;
-use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Load, Place, PlaceGoal, PlacingConfig};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Load, Place, PlaceGoal, PlaceKind, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::views::base_from_look_camera;
@@ -118,8 +118,8 @@ pub struct Rehearsed {
     /// The wrist camera's last picture before the approach of each attempt, with the detection drawn; `None` if no
     /// picture was taken.
     pub views: Vec<Option<RgbImage>>,
-    /// Whether parts were put down.
-    pub is_placing: bool,
+    /// Kind of the place where parts were put down; `None` for grasps only.
+    pub place: Option<PlaceKind>,
 }
 
 /// A failed attempt, as in the list of `--json` (docs/command-line.md).
@@ -131,6 +131,11 @@ pub struct Failure {
 }
 
 impl Rehearsed {
+    /// Whether parts were put down.
+    pub fn is_placing(&self) -> bool {
+        self.place.is_some()
+    }
+
     /// Number of successful attempts: the part was held or, with a place, put down in it.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
@@ -189,7 +194,7 @@ impl Rehearsal<'_> {
             attempts: Vec::new(),
             film: Vec::new(),
             views: Vec::new(),
-            is_placing: self.place.is_some(),
+            place: self.place.as_ref().map(|of_cell| of_cell.place.kind),
         };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
