@@ -35,7 +35,7 @@ impl Gripper {
         Self { target_m: position, reference_m: position, speed_m_s: 0.05, max_force_n: 30.0 }
     }
 
-    /// Starts to move to an opening (distance between the fingers in metres, 0 to 0.08), which changes at a speed (m/s).
+    /// Starts to move to an opening (distance between the fingers, 0 to 0.08 m), which changes at a speed (m/s).
     pub fn move_to(&mut self, opening_m: f64, speed_m_s: f64) {
         let target_m = finger_position_m(opening_m);
         *self = Self { target_m, speed_m_s: 0.5 * speed_m_s, max_force_n: 30.0, ..*self };

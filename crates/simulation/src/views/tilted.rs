@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use sdg_robot::camera_looking_down;
 
 /// The pose of a camera at a distance (m) from the point `aim` of the table, tilted from straight down about a
-/// horizontal axis through this point; `axis_rad` is the axis' direction about z from x, in the base frame. `yaw_rad` is
-/// the camera's yaw before it is tilted.
+/// horizontal axis through this point. `axis_rad` is the axis' direction about z from x, in the base frame, and
+/// `yaw_rad` is the camera's yaw before it is tilted.
 pub(super) fn tilted_camera(
     aim: &Vector3<f64>,
     distance_m: f64,
