@@ -18,11 +18,9 @@ pub struct Ended {
 }
 
 impl Ended {
-    /// Whether a picture was taken and did not contain the part. If the first motion was rejected, no picture was
-    /// taken.
+    /// As [`GraspReport::found_nothing`].
     pub fn found_nothing(&self) -> bool {
-        let is_look = matches!(self.grasp.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
-        is_look && self.grasp.targets.last() == Some(&None)
+        self.grasp.found_nothing()
     }
 }
 

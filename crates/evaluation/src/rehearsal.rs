@@ -17,7 +17,7 @@ use sdg_kinematics::ArmGeometry;
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::workcell::Workcell as WorkcellFile;
-use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Load, Place, PlaceGoal, PlacingConfig};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Load, Place, PlaceGoal, PlaceKind, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::views::base_from_look_camera;
@@ -118,8 +118,8 @@ pub struct Rehearsed {
     /// The wrist camera's last picture before the approach of each attempt, with the detection drawn; `None` if no
     /// picture was taken.
     pub views: Vec<Option<RgbImage>>,
-    /// Whether parts were put down.
-    pub is_placing: bool,
+    /// Kind of the place where parts were put down; `None` for grasps only.
+    pub place: Option<PlaceKind>,
 }
 
 /// A failed attempt, as in the list of `--json` (docs/command-line.md).
@@ -131,6 +131,11 @@ pub struct Failure {
 }
 
 impl Rehearsed {
+    /// Whether parts were put down.
+    pub fn is_placing(&self) -> bool {
+        self.place.is_some()
+    }
+
     /// Number of successful attempts: the part was held or, with a place, put down in it.
     pub fn successes(&self) -> usize {
         self.attempts.iter().filter(|attempt| attempt.success).count()
@@ -153,8 +158,7 @@ impl Rehearsed {
 
     /// Whether every attempt failed because the part was not found.
     pub fn found_nothing(&self) -> bool {
-        !self.attempts.is_empty()
-            && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == GraspStep::Detect as usize)
+        !self.attempts.is_empty() && self.attempts.iter().all(|attempt| attempt.not_found)
     }
 }
 
@@ -179,19 +183,31 @@ pub struct RehearsedAttempt {
 }
 
 impl Rehearsal<'_> {
-    /// Runs the attempts in order. `observe` is called after each one and may end the rehearsal.
+    /// Runs the attempts in order. `observe` is called after each one and may end the rehearsal. An attempt whose
+    /// physics fails is a failed attempt.
+    ///
+    /// # Errors
+    /// The other errors of [`Self::attempt`].
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed = Rehearsed {
             planned: self.attempts as usize,
             attempts: Vec::new(),
             film: Vec::new(),
             views: Vec::new(),
-            is_placing: self.place.is_some(),
+            place: self.place.as_ref().map(|of_cell| of_cell.place.kind),
         };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
-            let RehearsedAttempt { attempt, frames, view, .. } =
-                self.attempt(number, (!filmed_success).then(RecordConfig::default))?;
+            let started = Instant::now();
+            let attempted = self.attempt(number, (!filmed_success).then(RecordConfig::default));
+            let RehearsedAttempt { attempt, frames, view, .. } = match attempted {
+                Err(error) if is_of_physics(&error) => {
+                    let (why, duration_secs) = (error.root_cause().to_string(), started.elapsed().as_secs_f64());
+                    let attempt = AttemptSummary { step: None, why, duration_secs, ..self.begun(number, None) };
+                    RehearsedAttempt { attempt, looks: Looks::default(), frames: Vec::new(), view: None }
+                }
+                attempted => attempted?,
+            };
             if !frames.is_empty() {
                 rehearsed.film = frames;
                 filmed_success = attempt.success;
@@ -322,7 +338,8 @@ impl Rehearsal<'_> {
             .map(|(base_from_object, target)| grasp_error(self.object, &base_from_object, &target.base_from_tcp));
         AttemptSummary {
             detection_error,
-            step: step as usize,
+            step: Some(step as usize),
+            not_found: report.found_nothing,
             success: report.outcome.is_held(),
             why,
             duration_secs: report.wall_secs,
@@ -342,7 +359,8 @@ impl Rehearsal<'_> {
             object_mm,
             object_angle_deg,
             detection_error: None,
-            step: GraspStep::Detect as usize,
+            step: Some(GraspStep::Detect as usize),
+            not_found: false,
             success: false,
             why: String::new(),
             duration_secs: 0.0,
@@ -350,9 +368,22 @@ impl Rehearsal<'_> {
     }
 }
 
+/// Name of the step of an attempt whose simulation failed.
+pub(crate) const SIMULATION: &str = "simulation";
+
 /// Name of the step at which an attempt ended.
 pub fn step_name(attempt: &AttemptSummary) -> &'static str {
-    GraspStep::WITH_PLACING[attempt.step].name()
+    attempt.step.map_or(SIMULATION, |step| GraspStep::WITH_PLACING[step].name())
+}
+
+/// Whether the physics failed (not files, OpenGL or settings); then only this attempt fails.
+pub(crate) fn is_of_physics(error: &anyhow::Error) -> bool {
+    matches!(
+        error.downcast_ref::<SimulationError>(),
+        Some(
+            SimulationError::Unstable { .. } | SimulationError::TooManyContacts { .. } | SimulationError::MuJoCo { .. }
+        )
+    )
 }
 
 fn looks_of(report: &AttemptReport) -> Looks {
@@ -371,26 +402,63 @@ mod tests {
     use crate::shipped;
     use sdg_grasp::{ModelKind, SearchRegion, TeachOptions, teach};
 
-    #[test]
-    fn the_region_of_a_model_is_ignored() {
+    /// Model S of the pendulum, with a region.
+    fn taught() -> GraspModel {
         let mut options = TeachOptions::new(1);
         options.kind = ModelKind::S;
         options.region = Some(SearchRegion { x: 200, y: 100, width: 300, height: 300, picture: None });
         let demonstration = shipped::demonstration("pendulum").unwrap();
-        let model = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
-        assert!(model.region().is_some());
-        let object = ObjectSpec::by_name("pendulum").unwrap();
-        let rehearsal = Rehearsal {
-            model: &model,
-            object: &object,
-            attempts: 1,
+        teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model
+    }
+
+    fn rehearsal<'a>(model: &'a GraspModel, object: &'a ObjectSpec) -> Rehearsal<'a> {
+        Rehearsal {
+            model,
+            object,
+            attempts: 2,
             seed: 1,
             verification: Verification::ByShape,
             errors: RehearsalErrors::default(),
             camera: None,
             place: None,
-        };
-        assert_eq!(rehearsal.told_model(1).unwrap().region(), None);
+        }
+    }
+
+    #[test]
+    fn the_region_of_a_model_is_ignored() {
+        let (model, object) = (taught(), ObjectSpec::by_name("pendulum").unwrap());
+        assert!(model.region().is_some());
+        assert_eq!(rehearsal(&model, &object).told_model(1).unwrap().region(), None);
+    }
+
+    /// A part whose 110 boxes have more contacts with the table than a scene may have.
+    fn part_with_too_many_contacts() -> ObjectSpec {
+        let boxes: String = (0..110)
+            .map(|k| {
+                let (x, y) = (0.005 * f64::from(k % 11), 0.005 * f64::from(k / 11));
+                format!("<geom type=\"box\" pos=\"{x} {y} 0.0045\" size=\"0.002 0.002 0.005\" mass=\"0.001\"/>")
+            })
+            .collect();
+        let folder = tempfile::tempdir().unwrap();
+        let body = format!("<body name=\"object\"><freejoint name=\"object_joint\"/>{boxes}</body>");
+        let mjcf = format!("<mujoco><worldbody>{body}</worldbody></mujoco>");
+        std::fs::write(folder.path().join("object.xml"), mjcf).unwrap();
+        let metadata = r#"{"format": 1, "name": "brush", "title": "Brush", "description": "a brush", "mass_kg": 0.11,
+            "friction": 0.6, "grasp_start": [0, 0.02, 0.01], "grasp_end": [0.05, 0.02, 0.01], "jaw_width_m": 0.05,
+            "grasp_height_m": 0.006, "mark_height_m": 0.01, "rest_height_m": 0.0, "symmetry": "none",
+            "footprint": [[0, 0], [0.05, 0], [0.05, 0.045], [0, 0.045]], "mjcf": "object.xml"}"#;
+        std::fs::write(folder.path().join("object.json"), metadata).unwrap();
+        ObjectSpec::from_folder(folder.path()).unwrap()
+    }
+
+    #[test]
+    fn failing_physics_fail_an_attempt_and_not_the_rehearsal() {
+        let (model, object) = (taught(), part_with_too_many_contacts());
+        let rehearsed = rehearsal(&model, &object).run(&mut |_| ControlFlow::Continue(())).unwrap();
+        assert_eq!((rehearsed.attempts.len(), rehearsed.successes(), rehearsed.views.len()), (2, 0, 2));
+        assert!(rehearsed.failures().iter().all(|failure| failure.step == "simulation"), "{:?}", rehearsed.failures());
+        assert!(rehearsed.attempts[1].why.starts_with("too many contacts for this part"), "{:?}", rehearsed.attempts);
+        assert!(!rehearsed.found_nothing());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use sdg_grasp::{GraspModel, History};
 use sdg_report::{
     Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, outcome_matrix,
 };
-use sdg_robot::GraspStep;
+use sdg_robot::{GraspStep, PlaceKind, PlacingConfig};
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
@@ -42,15 +42,20 @@ const FILM_SPEED: f64 = 2.0;
 
 /// The page of `sdg rehearse`.
 pub fn rehearsal(page: &RunPage) -> Result<Report> {
-    let action = if page.rehearsed.is_placing { "grasp and place" } else { "grasp" };
+    let action = if page.rehearsed.is_placing() { "grasp and place" } else { "grasp" };
     let title = format!("{}: {} {action} attempts", page.object.title, page.rehearsed.attempts.len());
     let report = Report::new(title).kicker("Rehearsal in simulation").lead(format!(
-        "A grasp model taught from one photo searched for the {} on the table, {}.",
+        "A grasp model taught from {} searched for the {} on the table, {}.",
+        teaching_page::photos(page.model.demonstrations().len()),
         page.object.title.to_lowercase(),
         lifted(page)
     ));
     let report = with_film(with_key_figures(report, page), page)?;
-    Ok(report.section(attempts(page)).section(last_looks(page.rehearsed)).section(this_run(page)).footer(FOOTER))
+    Ok(report
+        .section(attempts(page.rehearsed))
+        .section(last_looks(page.rehearsed))
+        .section(this_run(page))
+        .footer(FOOTER))
 }
 
 /// The page of `sdg demo`.
@@ -83,12 +88,16 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
     if let Some(history) = taught.history {
         report = report.section(teaching_page::teaching(history));
     }
-    Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
+    Ok(report
+        .section(detections(&with_part, &without))
+        .section(attempts(page.rehearsed))
+        .section(this_run(page))
+        .footer(FOOTER))
 }
 
 /// The results of the attempts, as the end of a sentence.
 fn lifted(page: &RunPage) -> String {
-    let did = if page.rehearsed.is_placing { "put it down in its place" } else { "lifted it" };
+    let did = if page.rehearsed.is_placing() { "put it down in its place" } else { "lifted it" };
     let end = page.rehearsed.interruption().map(|told| format!("; it was {told}")).unwrap_or_default();
     match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
         (0, of) => format!("and {did} in none of {of} attempts{end}"),
@@ -100,7 +109,7 @@ fn with_key_figures(report: Report, page: &RunPage) -> Report {
     let attempts = &page.rehearsed.attempts;
     let successes = page.rehearsed.successes();
     let tone = if successes * 10 >= attempts.len() * 9 { Tone::Good } else { Tone::Warning };
-    let what = if page.rehearsed.is_placing { "grasped and put down" } else { "grasped and held" };
+    let what = if page.rehearsed.is_placing() { "grasped and put down" } else { "grasped and held" };
     let report =
         report.key_figure(KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), what).tone(tone));
     match median(attempts.iter().filter_map(|a| a.detection_error.map(|e| e.distance_mm))) {
@@ -119,7 +128,7 @@ fn with_film(report: Report, page: &RunPage) -> Result<Report> {
         ..AnimationOptions::default()
     };
     let film = Animation::encode(&page.rehearsed.film, &options)?;
-    let caption = match (page.rehearsed.successes(), page.rehearsed.is_placing) {
+    let caption = match (page.rehearsed.successes(), page.rehearsed.is_placing()) {
         (0, _) => "An attempt that failed, at twice its speed.",
         (_, false) => "One attempt, at twice its speed: look, hover, approach, close, lift, hold.",
         (_, true) => {
@@ -156,21 +165,31 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
         .gallery(GallerySize::Medium, shown.map(figure).collect())
 }
 
-fn attempts(page: &RunPage) -> Section {
-    let steps: Vec<&str> = match page.rehearsed.is_placing {
+fn attempts(rehearsed: &Rehearsed) -> Section {
+    let attempts = &rehearsed.attempts;
+    let steps: Vec<&str> = match rehearsed.is_placing() {
         true => GraspStep::WITH_PLACING.map(GraspStep::name).to_vec(),
         false => GraspStep::ALL.map(GraspStep::name).to_vec(),
     };
-    let (done, meaning) = match page.rehearsed.is_placing {
-        true => ("placed", "in its place in the last picture"),
-        false => ("held", "at least 10 cm above the table between both fingers, one second after lifting"),
+    let (done, varied) = match rehearsed.is_placing() {
+        true => ("placed", "light and tables"),
+        false => ("held", "light, tables and other objects"),
+    };
+    let meaning = match rehearsed.place {
+        None => "at least 10 cm above the table between both fingers, one second after lifting".to_owned(),
+        Some(PlaceKind::Bin { .. }) => {
+            "inside the bin, by its true pose and, if the last picture shows it, by this picture".to_owned()
+        }
+        Some(PlaceKind::Pose | PlaceKind::Tray { .. }) => {
+            let PlacingConfig { tolerance_m, tolerance_rad, .. } = PlacingConfig::default();
+            let (max_mm, max_deg) = (tolerance_m * 1e3, tolerance_rad.to_degrees());
+            format!("within {max_mm:.0} mm and {max_deg:.0}° of its place, by the last picture and by its true pose")
+        }
     };
     Section::new("Attempts")
-        .lead(format!(
-            "Random poses of the part, robot starts, light, tables and other objects. A part is {done} if it is {meaning}."
-        ))
-        .matrix(outcome_matrix(&steps, done, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
-        .table(attempts_table(&steps, done, &page.rehearsed.attempts).caption(
+        .lead(format!("Random poses of the part, robot starts, {varied}. A part is {done} if it is {meaning}."))
+        .matrix(outcome_matrix(&steps, done, attempts, RIGHT_MM, RIGHT_DEGREES))
+        .table(attempts_table(&steps, done, attempts).caption(
             "The part's position is in the robot's base frame. Errors are those of the second detection, from above \
              the part.",
         ))
@@ -223,7 +242,8 @@ mod tests {
             object_mm: [0.0; 2],
             object_angle_deg: 0.0,
             detection_error: None,
-            step: 0,
+            step: Some(0),
+            not_found: false,
             success: false,
             why: String::new(),
             duration_secs: 0.0,
@@ -233,12 +253,21 @@ mod tests {
             attempts: vec![attempt(1), attempt(2)],
             film: Vec::new(),
             views: vec![None, Some(RgbImage::new(8, 8))],
-            is_placing: false,
+            place: None,
         };
         let page = Report::new("rehearsal").section(last_looks(&rehearsed)).to_html().unwrap();
         assert!(page.contains("Attempt 2") && !page.contains("Attempt 1"), "{page}");
         assert_eq!(rehearsed.interruption().unwrap(), "interrupted after 2 of 5 attempts");
         rehearsed.planned = 2;
         assert_eq!(rehearsed.interruption(), None);
+
+        let mut told = |place| {
+            rehearsed.place = place;
+            Report::new("rehearsal").section(attempts(&rehearsed)).to_html().unwrap()
+        };
+        assert!(told(None).contains("light, tables and other objects. A part is held"));
+        let pose = told(Some(PlaceKind::Pose));
+        assert!(pose.contains("light and tables. A part is placed if it is within 3 mm and 3° of its place"), "{pose}");
+        assert!(told(Some(PlaceKind::Bin { size_m: [0.1; 2] })).contains("if it is inside the bin"));
     }
 }

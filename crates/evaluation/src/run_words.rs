@@ -5,7 +5,7 @@ use std::path::Path;
 use sdg_report::AttemptSummary;
 use serde_json::{Value, json};
 
-use crate::rehearsal::step_name;
+use crate::rehearsal::{SIMULATION, step_name};
 use crate::run_page::RunPage;
 
 /// The result of an attempt in words.
@@ -18,6 +18,7 @@ pub fn attempt_in_words(attempt: &AttemptSummary) -> String {
     let outcome = match (attempt.success, step) {
         (true, "check") => "placed".to_owned(),
         (true, _) => "grasped and held".to_owned(),
+        (false, SIMULATION) => format!("the simulation failed: {}", attempt.why),
         (false, _) => format!("failed at {step}: {}", attempt.why),
     };
     format!("{outcome}{error} ({:.1} s)", attempt.duration_secs)

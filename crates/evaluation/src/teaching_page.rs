@@ -39,6 +39,14 @@ pub struct TeachingPage<'a> {
     pub command: &'a str,
 }
 
+/// A number of photos in words.
+pub(crate) fn photos(count: usize) -> String {
+    match count {
+        1 => "one photo".to_owned(),
+        several => format!("{several} photos"),
+    }
+}
+
 impl TeachingPage<'_> {
     /// The page: photos and marks, samples, curves, and detections in held-out samples.
     ///
@@ -47,10 +55,7 @@ impl TeachingPage<'_> {
     pub fn report(&self) -> Result<Report> {
         let model = &self.taught.model;
         let name = model.object().replace('_', " ");
-        let photos = match self.demonstrations.len() {
-            1 => "one photo".to_owned(),
-            several => format!("{several} photos"),
-        };
+        let photos = photos(self.demonstrations.len());
         let mut report = Report::new(format!("{name}, taught from {photos}"))
             .kicker("Teaching")
             .lead(format!(

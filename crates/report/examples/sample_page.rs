@@ -210,7 +210,8 @@ fn attempts() -> Vec<AttemptSummary> {
                     distance_mm: random.random_range(0.4..2.2),
                     angle_deg: random.random_range(0.05..1.1),
                 }),
-                step: if success { 5 } else { 4 },
+                step: Some(if success { 5 } else { 4 }),
+                not_found: false,
                 success,
                 why: if success {
                     String::new()

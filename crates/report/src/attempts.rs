@@ -25,8 +25,10 @@ pub struct AttemptSummary {
     pub object_angle_deg: f64,
     /// The error of the detection; `None` without a detection.
     pub detection_error: Option<DetectionError>,
-    /// Index of the step at which the attempt ended, from 0; the last step on success.
-    pub step: usize,
+    /// Index of the step at which the attempt ended, from 0; the last step on success. `None` if the simulation failed.
+    pub step: Option<usize>,
+    /// Whether the attempt ended because the last picture did not show the part.
+    pub not_found: bool,
     /// Whether the part was held at the end or, in an attempt with a place, was put down in it.
     pub success: bool,
     /// The reason of the failure; empty on success.
@@ -66,9 +68,9 @@ pub fn attempts_table(steps: &[&str], done: &str, attempts: &[AttemptSummary]) -
                 note: (!why.is_empty()).then(|| why.to_owned()),
             },
             Cell::Progress {
-                done: if attempt.success { steps.len() } else { attempt.step },
+                done: if attempt.success { steps.len() } else { attempt.step.unwrap_or(0) },
                 total: steps.len(),
-                label: steps[attempt.step].to_owned(),
+                label: attempt.step.map_or("simulation", |step| steps[step]).to_owned(),
             },
             Cell::number(attempt.object_mm[0], 0),
             Cell::number(attempt.object_mm[1], 0),
@@ -100,7 +102,8 @@ pub fn attempts_table(steps: &[&str], done: &str, attempts: &[AttemptSummary]) -
 }
 
 /// Detections and outcomes: numbers of attempts by the class of the last detection's error (rows) and by the step at
-/// which the attempt failed (columns). The last column, named `done`, is success.
+/// which the attempt failed (columns). The last column, named `done`, is success. Attempts whose simulation failed are
+/// not counted.
 ///
 /// `right_mm` and `right_deg` are the maximum errors of a correct detection.
 #[must_use]
@@ -112,22 +115,35 @@ pub fn outcome_matrix(
     right_deg: f64,
 ) -> Matrix {
     let seen = |attempt: &AttemptSummary| match attempt.detection_error {
+        _ if attempt.not_found => 2,
         Some(error) if error.distance_mm <= right_mm && error.angle_deg <= right_deg => 0,
         Some(_) => 1,
-        None => 2,
+        None => 3,
     };
-    let mut counts = vec![vec![0usize; steps.len() + 1]; 3];
+    let mut counts = vec![vec![0usize; steps.len() + 1]; 4];
     for attempt in attempts {
-        let ended = if attempt.success { steps.len() } else { attempt.step };
-        counts[seen(attempt)][ended] += 1;
+        let ended = if attempt.success { Some(steps.len()) } else { attempt.step };
+        if let Some(ended) = ended {
+            counts[seen(attempt)][ended] += 1;
+        }
+    }
+    let mut caption = format!(
+        "Correct: the last detection is within {right_mm:.0} mm and {right_deg:.0}° of the ground truth. A \
+         failure in the first row is due to the robot, in the next two to perception."
+    );
+    if counts[3].iter().all(|&count| count == 0) {
+        counts.truncate(3);
+    } else {
+        caption += " Not searched: no picture was taken, or the search of a picture failed.";
+    }
+    let num_simulation = attempts.iter().filter(|attempt| attempt.step.is_none()).count();
+    if num_simulation > 0 {
+        caption += &format!(" Not counted: {num_simulation} of {} attempts, whose simulation failed.", attempts.len());
     }
     let columns = steps.iter().copied().chain([done]);
-    let labels = ["correct".to_owned(), "wrong".to_owned(), "not detected".to_owned()];
+    let labels = ["correct", "wrong", "not detected", "not searched"];
     let matrix = Matrix::new("Last detection, and step at which the attempt ended", columns).good_column(steps.len());
-    labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
-        "Correct: the last detection is within {right_mm:.0} mm and {right_deg:.0}° of the ground truth. A \
-         failure in the first row is due to the robot, in the others to perception."
-    ))
+    labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(caption)
 }
 
 #[cfg(test)]
@@ -143,7 +159,8 @@ mod tests {
             object_mm: [512.0, -34.0],
             object_angle_deg: 127.0,
             detection_error: (step > 0).then_some(DetectionError { distance_mm: number as f64, angle_deg: 0.5 }),
-            step,
+            step: Some(step),
+            not_found: step == 0,
             success,
             why: why.to_owned(),
             duration_secs: 9.5,
@@ -166,6 +183,23 @@ mod tests {
         .to_html();
         assert_well_formed(&html);
         assert!(html.contains("correct: lift 1, held 1. wrong: close 1. not detected: detect 1."), "{html}");
+        assert!(!html.contains("not searched") && !html.contains("Not counted"), "{html}");
+    }
+
+    #[test]
+    fn perception_is_not_blamed_without_a_searched_picture() {
+        let blocked = AttemptSummary { not_found: false, ..attempt(1, 0, false, "the way is blocked") };
+        let not_confirmed = AttemptSummary {
+            detection_error: Some(DetectionError { distance_mm: 1.0, angle_deg: 0.5 }),
+            ..attempt(2, 0, false, "nothing found from above")
+        };
+        let unstable = AttemptSummary { step: None, ..blocked.clone() };
+        let attempts = [blocked, not_confirmed, unstable];
+        let html = outcome_matrix(&STEPS, "held", &attempts, 10.0, 10.0).to_html();
+        assert_well_formed(&html);
+        assert!(html.contains("correct: nothing. wrong: nothing. not detected: detect 1. not searched: detect 1."));
+        assert!(html.contains("Not counted: 1 of 3 attempts"), "{html}");
+        assert!(attempts_table(&STEPS, "held", &attempts).to_html().contains("simulation"));
     }
 
     #[test]

@@ -146,7 +146,7 @@ impl Arm for Workcell {
     fn start_hand(&mut self, command: HandCommand) -> Result<()> {
         match command {
             _ if self.fault() == Some(ArmFaultKind::HandStuck) => {}
-            HandCommand::Move { opening_m, .. } => self.gripper.move_to(opening_m),
+            HandCommand::Move { opening_m, speed_m_s } => self.gripper.move_to(opening_m, speed_m_s),
             HandCommand::Grasp { force_n, .. } => self.gripper.grasp(force_n),
         }
         self.hand_command = Some(command);

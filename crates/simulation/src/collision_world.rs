@@ -71,7 +71,8 @@ impl CollisionWorld {
     /// All overlaps at a configuration.
     ///
     /// # Errors
-    /// [`crate::SimulationError::Unstable`] for positions that are not finite, and if MuJoCo's list of contacts is full.
+    /// [`crate::SimulationError::Unstable`] for positions that are not finite, and
+    /// [`crate::SimulationError::TooManyContacts`].
     pub fn overlaps(&mut self, q: &JointVector) -> Result<Vec<Overlap>> {
         self.ids.set_position(&mut self.data, q);
         self.data.collide()?;

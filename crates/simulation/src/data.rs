@@ -75,24 +75,24 @@ impl Data {
     /// Computes everything that follows from `qpos`, `qvel` and `ctrl`, without a time step.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    /// [`SimulationError::MuJoCo`], [`SimulationError::Unstable`] or [`SimulationError::TooManyContacts`].
     pub fn forward(&mut self) -> Result<()> {
         // SAFETY: model and data are live and belong together.
         guarded("mj_forward", || unsafe { mj::mj_forward(self.model.as_ptr(), self.ptr) })?;
-        self.check()
+        self.check(self.time_secs())
     }
 
     /// Computes only positions and overlaps: no forces, no time step.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    /// [`SimulationError::MuJoCo`], [`SimulationError::Unstable`] or [`SimulationError::TooManyContacts`].
     pub(crate) fn collide(&mut self) -> Result<()> {
         // SAFETY: model and data are live and belong together; collision reads what kinematics wrote.
         guarded("mj_collision", || unsafe {
             mj::mj_kinematics(self.model.as_ptr(), self.ptr);
             mj::mj_collision(self.model.as_ptr(), self.ptr);
         })?;
-        self.check()
+        self.check(self.time_secs())
     }
 
     /// Pairs of overlapping geoms with their depths (m), after [`Data::collide`].
@@ -109,50 +109,53 @@ impl Data {
     /// Advances by one timestep.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    /// [`SimulationError::MuJoCo`], [`SimulationError::Unstable`] or [`SimulationError::TooManyContacts`].
     pub fn step(&mut self) -> Result<()> {
+        let before_secs = self.time_secs();
         // SAFETY: model and data are live and belong together.
         guarded("mj_step", || unsafe { mj::mj_step(self.model.as_ptr(), self.ptr) })?;
-        self.check()
+        self.check(before_secs)
     }
 
     /// The first half of a step: everything that follows from positions and velocities, for a
     /// controller to read before it sets `ctrl`.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    /// [`SimulationError::MuJoCo`], [`SimulationError::Unstable`] or [`SimulationError::TooManyContacts`].
     pub fn step1(&mut self) -> Result<()> {
+        let before_secs = self.time_secs();
         // SAFETY: model and data are live and belong together.
         guarded("mj_step1", || unsafe { mj::mj_step1(self.model.as_ptr(), self.ptr) })?;
-        self.check()
+        self.check(before_secs)
     }
 
     /// The second half of a step: forces from `ctrl`, accelerations, new positions.
     ///
     /// # Errors
-    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    /// [`SimulationError::MuJoCo`], [`SimulationError::Unstable`] or [`SimulationError::TooManyContacts`].
     pub fn step2(&mut self) -> Result<()> {
+        let before_secs = self.time_secs();
         // SAFETY: model and data are live and belong together.
         guarded("mj_step2", || unsafe { mj::mj_step2(self.model.as_ptr(), self.ptr) })?;
-        self.check()
+        self.check(before_secs)
     }
 
     /// Returns an error for positions or velocities that are not finite, and if MuJoCo has warned of invalid numbers or
-    /// of a full list of contacts or constraints. After invalid numbers in a time step, MuJoCo resets the state.
-    fn check(&self) -> Result<()> {
+    /// of a full list of contacts or constraints. `time_secs` is the time before the call of MuJoCo: after invalid
+    /// numbers in a time step, MuJoCo resets the state and its time.
+    fn check(&self, time_secs: f64) -> Result<()> {
         // MuJoCo looks for such numbers in time steps only.
         let is_finite = self.qpos().iter().chain(self.qvel()).all(|number| number.is_finite());
-        let bad = [
-            mj::mjWARN_BADQPOS,
-            mj::mjWARN_BADQVEL,
-            mj::mjWARN_BADQACC,
-            mj::mjWARN_BADCTRL,
-            mj::mjWARN_CONTACTFULL,
-            mj::mjWARN_CNSTRFULL,
-        ];
-        if !is_finite || bad.iter().any(|&warning| self.raw().warning[warning as usize].number > 0) {
+        let has_warned = |warning: mj::mjtWarning_| self.raw().warning[warning as usize].number > 0;
+        let bad = [mj::mjWARN_BADQPOS, mj::mjWARN_BADQVEL, mj::mjWARN_BADQACC, mj::mjWARN_BADCTRL];
+        if !is_finite || bad.into_iter().any(has_warned) {
             let message = take_warnings().pop().unwrap_or_else(|| "a number is not finite or too large".into());
-            return Err(SimulationError::Unstable { time_secs: self.time_secs(), message });
+            return Err(SimulationError::Unstable { time_secs, message });
+        }
+        if [mj::mjWARN_CONTACTFULL, mj::mjWARN_CNSTRFULL].into_iter().any(has_warned) {
+            // MuJoCo advises to change the model's XML, which users do not see.
+            take_warnings();
+            return Err(SimulationError::TooManyContacts { time_secs });
         }
         Ok(())
     }
@@ -368,8 +371,22 @@ mod tests {
     #[test]
     fn divergence_is_an_error() {
         let mut data = data(BALL_ON_PLANE);
+        for _ in 0..500 {
+            data.step().unwrap();
+        }
         data.qpos_mut()[2] = f64::NAN;
-        assert!(matches!(data.step(), Err(SimulationError::Unstable { .. })));
+        let Err(SimulationError::Unstable { time_secs, .. }) = data.step() else { panic!("no error") };
+        assert!((time_secs - 0.5).abs() < 1e-9, "{time_secs}");
+    }
+
+    #[test]
+    fn a_full_list_of_contacts_is_an_error() {
+        // A box on a plane has four contacts.
+        let xml = "<mujoco><size njmax='100' nconmax='2'/><worldbody><geom type='plane' size='1 1 1'/>\
+                   <body pos='0 0 .05'><freejoint/><geom type='box' size='.05 .05 .05'/></body></worldbody></mujoco>";
+        let error = Data::new(Arc::new(Model::from_xml(xml, &[]).unwrap())).err().unwrap();
+        let expected = "too many contacts for this part or scene, at 0.000 s of simulated time";
+        assert_eq!(error.to_string(), expected);
     }
 
     #[test]

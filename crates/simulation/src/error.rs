@@ -37,13 +37,19 @@ pub enum SimulationError {
         message: String,
     },
 
-    /// The simulation diverged (positions, velocities or accelerations are infinite, NaN or huge), or it has too many
-    /// contacts or constraints.
+    /// The simulation diverged (positions, velocities or accelerations are infinite, NaN or huge).
     #[error("the simulation became unstable at {time_secs:.3} s of simulated time: {message}")]
     Unstable {
-        /// Simulated time at which the error was detected, in seconds.
+        /// Simulated time before the failed step, in seconds.
         time_secs: f64,
         message: String,
+    },
+
+    /// MuJoCo's list of contacts or of constraints is full.
+    #[error("too many contacts for this part or scene, at {time_secs:.3} s of simulated time")]
+    TooManyContacts {
+        /// Simulated time before the failed step, in seconds.
+        time_secs: f64,
     },
 
     /// A name that does not exist among those of its kind.

@@ -51,8 +51,8 @@ impl PandaPlant {
     /// Creates a scene with the arm at rest in its ready pose and the hand open.
     ///
     /// # Errors
-    /// `Model` if MuJoCo rejects the scene, `Library` for the wrong libmujoco, `Unstable` for a scene with too many
-    /// contacts, `Configuration` for a camera lens whose model does not cover the corners of its own picture.
+    /// `Model` if MuJoCo rejects the scene, `Library` for the wrong libmujoco, `TooManyContacts` for a crowded scene,
+    /// `Configuration` for a camera lens whose model does not cover the corners of its own picture.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
         let model = build_model(config, "")?;
         let ids = PandaIds::find(&model)?;

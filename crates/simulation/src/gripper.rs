@@ -35,9 +35,10 @@ impl Gripper {
         Self { target_m: position, reference_m: position, speed_m_s: 0.05, max_force_n: 30.0 }
     }
 
-    /// Starts to move to an opening (distance between the fingers in metres, 0 to 0.08).
-    pub fn move_to(&mut self, opening_m: f64) {
-        *self = Self { target_m: finger_position_m(opening_m), speed_m_s: 0.1, max_force_n: 30.0, ..*self };
+    /// Starts to move to an opening (distance between the fingers, 0 to 0.08 m), which changes at a speed (m/s).
+    pub fn move_to(&mut self, opening_m: f64, speed_m_s: f64) {
+        let target_m = finger_position_m(opening_m);
+        *self = Self { target_m, speed_m_s: 0.5 * speed_m_s, max_force_n: 30.0, ..*self };
     }
 
     /// Starts to close until each finger presses with `force_n` newtons.
@@ -121,10 +122,24 @@ mod tests {
     fn it_opens_as_far_as_it_is_told() {
         let (mut data, ids) = hand_around_a_block(0.001);
         let mut gripper = Gripper::at_opening_m(0.08);
-        gripper.move_to(0.05);
+        gripper.move_to(0.05, 0.2);
         run(&mut data, &ids, &mut gripper, 600);
         for position in ids.finger_position_m(&data) {
             assert!((position - 0.025).abs() < 2e-4, "{position}");
+        }
+    }
+
+    #[test]
+    fn it_opens_as_fast_as_it_is_told() {
+        let (mut data, ids) = hand_around_a_block(0.001);
+        ids.set_finger_position_m(&mut data, 0.015);
+        let mut gripper = Gripper::at_opening_m(0.03);
+        gripper.move_to(0.05, 0.05);
+        // Opening by 20 mm takes 0.4 s.
+        for (num_steps, expected_m) in [(350, 0.0475), (200, 0.05)] {
+            run(&mut data, &ids, &mut gripper, num_steps);
+            let opening_m: f64 = ids.finger_position_m(&data).iter().sum();
+            assert!((opening_m - expected_m).abs() < 1e-3, "{opening_m}");
         }
     }
 

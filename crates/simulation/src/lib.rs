@@ -45,6 +45,7 @@ mod guard;
 mod inverse_dynamics;
 mod lens;
 mod model;
+mod normal;
 pub mod objects;
 mod obstacles;
 mod oracle;

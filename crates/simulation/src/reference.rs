@@ -10,7 +10,7 @@ impl Workcell {
     /// Advances by one period, with the controller's reference at these positions (rad), velocities and accelerations.
     ///
     /// # Errors
-    /// [`SimulationError::Unstable`](crate::SimulationError::Unstable).
+    /// As for [`Data::step`](crate::Data::step).
     pub fn advance(&mut self, q: &JointVector, dq: &JointVector, ddq: &JointVector) -> Result<()> {
         self.set_reference(ArmReference { position: *q, velocity: *dq, acceleration: *ddq });
         self.tick()

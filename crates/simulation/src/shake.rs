@@ -44,7 +44,7 @@ impl Workcell {
     /// in metres.
     ///
     /// # Errors
-    /// [`crate::SimulationError::Unstable`] or a renderer's error while recording.
+    /// As for [`crate::Data::step`], or a renderer's error while recording.
     pub(crate) fn shake(&mut self, shake: &Shake) -> Result<f64> {
         let start = self.commanded();
         let along = Vector3::new(shake.direction_rad.cos(), shake.direction_rad.sin(), 0.0);

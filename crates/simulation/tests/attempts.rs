@@ -4,12 +4,14 @@
 
 use std::fs;
 
-use nalgebra::{Isometry3, Translation3};
+use image::{Rgb, RgbImage};
+use nalgebra::{Isometry3, Point2, Translation3, Vector2};
+use sdg_geometry::{GraspLine, Polygon, RotationalSymmetry};
 use sdg_robot::{
     GraspConfig, GraspOutcome, GraspStep, GraspTarget, LOOK_HEIGHT_M, PartFinder, Place, PlaceKind, PlacingConfig,
     RobotError, camera_looking_down,
 };
-use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::objects::{Extrusion, ObjectSpec};
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
     AttemptConfig, AttemptErrors, AttemptReport, CameraView, RecordConfig, RenderConfig, SimulationError, Workcell,
@@ -126,6 +128,59 @@ fn every_part_of_known_pose_is_lifted() {
     }
 }
 
+/// A part of 1500 kg/m³ extruded from an outline in millimetres, marked lengthwise (along x) in its middle.
+fn extruded(outline_mm: &[[f64; 2]], height_mm: f64) -> ObjectSpec {
+    let photo = RgbImage::from_pixel(80, 80, Rgb([180, 40, 40]));
+    let outline = Polygon { vertices: outline_mm.iter().map(|&corner| Point2::from(corner)).collect() };
+    let (bounds, half) = (outline.bounds(), Vector2::new(10.0, 0.0));
+    let mut extrusion = Extrusion {
+        name: "part",
+        photo: &photo,
+        outline: &outline,
+        grasp: GraspLine::new(bounds.center() - half, bounds.center() + half),
+        jaw_width_px: bounds.height(),
+        metres_per_pixel: 1e-3,
+        height_m: 1e-3 * height_mm,
+        mass_kg: 0.0,
+        friction: 0.6,
+        symmetry: RotationalSymmetry::None,
+    };
+    extrusion.mass_kg = 1500.0 * extrusion.volume_m3();
+    ObjectSpec::extruded(&extrusion).unwrap()
+}
+
+fn rectangle_mm(length: f64, width: f64) -> [[f64; 2]; 4] {
+    [[0.0, 0.0], [length, 0.0], [length, width], [0.0, width]]
+}
+
+/// Three prongs along x, 28 x 36 mm times `scale`.
+fn prongs_mm(scale: f64) -> [[f64; 2]; 12] {
+    [[0, 0], [28, 0], [28, 8], [4, 8], [4, 14], [28, 14], [28, 22], [4, 22], [4, 28], [28, 28], [28, 36], [0, 36]]
+        .map(|corner| corner.map(|mm: i32| scale * f64::from(mm)))
+}
+
+#[test]
+fn small_tall_and_forked_own_parts_are_lifted() {
+    let parts = [
+        ("50 x 15 x 20 mm", extruded(&rectangle_mm(50.0, 15.0), 20.0)),
+        ("30 x 15 x 12 mm", extruded(&rectangle_mm(30.0, 15.0), 12.0)),
+        ("three prongs", extruded(&prongs_mm(1.0), 12.0)),
+    ];
+    for (name, spec) in parts {
+        let mut cell = unlit_cell(SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6)))));
+        let report = cell.run_oracle_attempt(&AttemptConfig::default(), 1).unwrap();
+        assert_eq!(report.outcome, GraspOutcome::Held, "{name}");
+    }
+}
+
+#[test]
+fn a_forked_own_part_fits_among_six_distractors() {
+    let config = VariationConfig { appearance: false, distractors: 6..=6, ..VariationConfig::default() };
+    let scene = SceneVariation::sample(Some(&extruded(&prongs_mm(2.0), 12.0)), &config, 1);
+    assert!(scene.distractors.len() >= 4, "{}", scene.distractors.len());
+    unlit_cell(scene);
+}
+
 #[test]
 fn the_same_seed_gives_the_same_attempt_and_another_start_another() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
@@ -143,7 +198,9 @@ fn the_same_seed_gives_the_same_attempt_and_another_start_another() {
 #[test]
 fn nothing_seen_is_a_failure_to_detect() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
-    let (step, why) = attempt(&mut cell, || None);
+    let report = cell.run_attempt(&mut Looking::new(|| None), &AttemptConfig::default(), 1).unwrap();
+    assert!(report.found_nothing);
+    let (step, why) = failure(report);
     assert_eq!((step, why.as_str()), (GraspStep::Detect, "the part was not found in 3 looks"));
 
     let mut looks = 0;
@@ -194,7 +251,10 @@ fn the_second_look_may_be_less_sure_of_what_the_first_one_saw() {
 #[test]
 fn a_part_wider_than_the_hand_is_refused() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
-    let (step, why) = attempt(&mut cell, || Some(GraspTarget { jaw_width_m: 0.095, ..true_target() }));
+    let mut wide = Looking::new(|| Some(GraspTarget { jaw_width_m: 0.095, ..true_target() }));
+    let report = cell.run_attempt(&mut wide, &AttemptConfig::default(), 1).unwrap();
+    assert!(!report.found_nothing);
+    let (step, why) = failure(report);
     assert_eq!((step, why.as_str()), (GraspStep::Detect, "the part is 95 mm wide, the hand opens 80 mm"));
 }
 

@@ -2,13 +2,12 @@
 
 use anyhow::Result;
 use sdg_inputs::one_line;
-use sdg_simulation::SimulationError;
 use serde::Serialize;
 
 use super::cell::read_attempts;
 use super::records::{AttemptRecord, AttemptsRecord};
 use super::store::Store;
-use crate::rehearsal::Rehearsal;
+use crate::rehearsal::{Rehearsal, is_of_physics};
 
 /// Continues the attempts in a file of the store for these settings; `None` if interrupted.
 ///
@@ -42,12 +41,4 @@ pub(super) fn go_on(
 pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
     let held = attempts.iter().filter(|attempt| attempt.success).count();
     format!("held in {held} of {}", attempts.len())
-}
-
-/// Whether the physics failed (not files, OpenGL or settings); then only this attempt fails.
-fn is_of_physics(error: &anyhow::Error) -> bool {
-    matches!(
-        error.downcast_ref::<SimulationError>(),
-        Some(SimulationError::Unstable { .. } | SimulationError::MuJoCo { .. })
-    )
 }

@@ -5,7 +5,7 @@ use sdg_report::DetectionError;
 use sdg_robot::GraspStep;
 use serde::{Deserialize, Serialize};
 
-use crate::rehearsal::{Looks, RehearsedAttempt, step_name};
+use crate::rehearsal::{Looks, RehearsedAttempt, SIMULATION, step_name};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// Number of steps per stored value of the loss.
@@ -55,7 +55,7 @@ pub struct AttemptRecord {
 
 impl AttemptRecord {
     /// Name of the step for an attempt in which the simulation failed.
-    pub const SIMULATION: &str = "simulation";
+    pub const SIMULATION: &str = SIMULATION;
     /// Name of the step for an attempt without a model.
     pub const TEACH: &str = "teach";
 

@@ -199,6 +199,13 @@ impl GraspReport {
             height: None,
         }
     }
+
+    /// Whether a picture was taken and did not contain the part. If the first motion was rejected, no picture was
+    /// taken.
+    pub fn found_nothing(&self) -> bool {
+        let is_look = matches!(self.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
+        is_look && self.targets.last() == Some(&None)
+    }
 }
 
 impl GraspOutcome {

@@ -109,7 +109,9 @@ impl Workcell {
             }
         };
         let frames = self.stop_recording();
-        let GraspReport { mut outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
+        let grasp = ended.map_err(SimulationError::from)?;
+        let found_nothing = grasp.found_nothing();
+        let GraspReport { mut outcome, targets, looks, hand_verdicts, .. } = grasp;
         let placed = config.placing.as_ref().zip(self.true_place_error(config));
         if let (true, Some(((goal, placing), error))) = (outcome.is_held(), placed)
             && let Some(why) = self.why_not_placed(goal, placing, &error)
@@ -122,6 +124,7 @@ impl Workcell {
             seed,
             base_from_object,
             targets,
+            found_nothing,
             looks,
             place_error: placed.map(|(_, error)| error),
             shake_amplitude_m: judge.shake_amplitude_m,

@@ -19,6 +19,8 @@ pub struct AttemptReport {
     /// The accepted detection of each picture: from look-out poses until the part was found, then from above it. The
     /// last target is that at the part's height, if this height was determined.
     pub targets: Vec<Option<GraspTarget>>,
+    /// Whether a picture was taken and did not contain the part.
+    pub found_nothing: bool,
     /// Numbers of pictures from look-out poses and from above the detection: one each if the first pictures show the
     /// part.
     pub looks: [usize; 2],

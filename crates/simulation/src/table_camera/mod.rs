@@ -29,6 +29,7 @@ use crate::camera::posed_camera;
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
 use crate::model::{Camera, Id, Joint, Model};
+use crate::normal::normal;
 use crate::objects::ObjectSpec;
 use crate::render::{RenderConfig, Renderer};
 use crate::scene::PlacedObject;
@@ -254,12 +255,6 @@ impl Moving {
         let middle = turn * Vector3::new(self.middle.x, self.middle.y, 0.0);
         self.spec.base_from_object(place.x - middle.x, place.y - middle.y, *yaw_rad)
     }
-}
-
-/// A sample of the standard normal distribution, by the method of Box and Muller.
-fn normal(rng: &mut Pcg64Mcg) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 
 use super::config::TableCameraConfig;
 use super::motion::Bounds;
-use crate::camera::{WRIST_FOCAL_LENGTH_PX, vertical_field_of_view_rad};
+use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_field_of_view_rad};
 use crate::model::Asset;
 use crate::objects::ObjectSpec;
 use crate::render::RenderConfig;
@@ -76,8 +76,7 @@ pub(super) fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> Strin
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), config.tilt_rad);
     let foot = Translation3::new(at.x, at.y, 0.0);
     let optical = foot * tilt * foot.inverse() * Isometry3::from_parts(at, look.rotation);
-    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let pose = pose_attributes(&(optical * half_turn));
+    let pose = pose_attributes(&(optical * optical_from_mujoco_camera().rotation));
     let mut text = String::new();
     let _ = write!(
         text,

@@ -5,6 +5,8 @@
 mod axis;
 mod nominal;
 mod other_camera;
+mod seed;
+mod tilted;
 
 pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_view};
 pub(crate) use nominal::shows_whole;

@@ -7,14 +7,15 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
-use sdg_robot::camera_looking_down;
 
+use super::seed::seed_of;
+use super::tilted::tilted_camera;
 use super::{GraspTruth, shows_whole};
-use crate::camera::CameraView;
+use crate::camera::{CameraView, optical_from_mujoco_camera};
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
 use crate::lens::Frustum;
@@ -121,7 +122,7 @@ pub fn other_view(
     (number, of): (u64, u64),
     seed: u64,
 ) -> Result<OtherView> {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, number, seed));
+    let mut rng = rng_of(&spec.name, camera.name, number, seed);
     let scene_seed = rng.random();
     let shown = match on_table {
         OnTable::Part => spec.clone(),
@@ -157,8 +158,7 @@ pub fn other_view(
 /// picture's corners.
 fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
     let frustum = Frustum::around(&camera.intrinsics)?;
-    // MuJoCo's cameras look along -z with y up.
-    let mujoco = camera.world_from_camera * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    let mujoco = camera.world_from_camera * optical_from_mujoco_camera().rotation;
     let named = format!(
         "<worldbody><camera name=\"beside\" {} fovy=\"{:.12}\"/></worldbody>",
         pose_attributes(&mujoco),
@@ -181,10 +181,7 @@ fn looking_at(part: &PlacedObject, distance_m: f64, tilt_deg: f64, rng: &mut Pcg
     let offset = [0; 2].map(|_: i32| rng.random_range(-MAX_LOOK_OFFSET_M..MAX_LOOK_OFFSET_M));
     let aim = Vector3::new(at.x + offset[0], at.y + offset[1], 0.0);
     let [axis_rad, yaw_rad]: [f64; 2] = [0; 2].map(|_: i32| rng.random_range(-PI..PI));
-    let axis = Unit::new_normalize(Vector3::new(axis_rad.cos(), axis_rad.sin(), 0.0));
-    let tilted = UnitQuaternion::from_axis_angle(&axis, tilt_deg.to_radians());
-    let about_aim = Translation3::from(aim) * tilted * Translation3::from(-aim);
-    about_aim * camera_looking_down(aim.x, aim.y, distance_m, yaw_rad)
+    tilted_camera(&aim, distance_m, yaw_rad, axis_rad, tilt_deg)
 }
 
 fn no_place(camera: &OtherCamera, part: &str) -> SimulationError {
@@ -195,12 +192,9 @@ fn no_place(camera: &OtherCamera, part: &str) -> SimulationError {
     }
 }
 
-/// FNV-1a over the names, mixed with the numbers.
-fn seed_of(part: &str, camera: &str, number: u64, seed: u64) -> u64 {
-    let names = part.bytes().chain([0]).chain(camera.bytes());
-    let named =
-        names.fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    named ^ seed.wrapping_mul(0xd134_2543_de82_ef95) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+/// Random numbers of a picture.
+fn rng_of(part: &str, camera: &str, number: u64, seed: u64) -> Pcg64Mcg {
+    Pcg64Mcg::seed_from_u64(seed_of(part.bytes().chain([0]).chain(camera.bytes()), number, seed))
 }
 
 #[cfg(test)]
@@ -236,7 +230,7 @@ mod tests {
     }
 
     fn scene_of(spec: &ObjectSpec, camera: &OtherCamera) -> SceneVariation {
-        let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, 18, 3));
+        let mut rng = rng_of(&spec.name, camera.name, 18, 3);
         SceneVariation::sample(Some(spec), &VariationConfig::default(), rng.random())
     }
 }

@@ -21,9 +21,22 @@ pub(crate) const CAMERA_IN_BASE: &str = "beside";
 /// Distance of the floor below the table, in metres.
 const FLOOR_BELOW_TABLE_M: f64 = 0.75;
 
+/// Capacity of MuJoCo's lists of contacts and constraint rows: five times the need of attempts with shipped parts and
+/// of crowded scenes (78 contacts, 289 rows). It is limited because MuJoCo allocates memory in proportion to the square
+/// of the rows, and sets it to zero for each scene: 28 MB for 1500 rows, 76 MB for 2500.
+const NUM_CONTACTS: usize = 400;
+const NUM_ROWS: usize = 1500;
+/// Number of collision shapes of a part for which this capacity is sufficient; shipped parts have up to 17.
+const NUM_SHAPES: usize = 20;
+/// Contacts of each further shape, a box of an extruded part, with the table, and rows of a contact with friction.
+const CONTACTS_PER_BOX: usize = 4;
+const ROWS_PER_CONTACT: usize = 4;
+
 /// Builds MuJoCo's model of the robot, the table and the objects on it, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
     let mut fragment = config.scene.fragment_on_table(config.table_height_m);
+    let num_more_shapes = fragment.sections.matches("_collision_").count().saturating_sub(NUM_SHAPES);
+    let num_more_contacts = CONTACTS_PER_BOX * num_more_shapes;
     if let Some(seen) = &config.seen_part {
         fragment.append(seen.fragment());
     }
@@ -52,6 +65,8 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
     };
     let xml = include_str!("../../assets/workcell.xml")
         .replace("PANDA_FILE", PANDA_FILE)
+        .replace("NUM_CONTACTS", &(NUM_CONTACTS + num_more_contacts).to_string())
+        .replace("NUM_ROWS", &(NUM_ROWS + ROWS_PER_CONTACT * num_more_contacts).to_string())
         .replace("FLOOR_Z_M", &(config.table_height_m - FLOOR_BELOW_TABLE_M).to_string())
         .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + &obstacles + sections));
     let mut assets = fragment.files;

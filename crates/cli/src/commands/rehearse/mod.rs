@@ -38,8 +38,8 @@ pub struct RehearseArgs {
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
     /// Put the part down at this place of the workcell file: NAME, or NAME:CELL for one cell of a tray; with NAME
-    /// alone, the tray's cells are used one after another. An attempt succeeds if the part's true pose is within 3 mm
-    /// and 3° of its place
+    /// alone, the tray's cells are used one after another. An attempt succeeds if the part is within 3 mm and 3° of its
+    /// place or, for a bin, inside it, both by the last picture and by its true pose
     #[arg(long, value_name = "NAME", requires = "workcell")]
     pub place: Option<String>,
     /// The workcell file, with places and obstacles

@@ -151,7 +151,7 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         if let Some(seconds) = teach_seconds {
             println!("taught the {} from one photo in {seconds:.0} s", object.title.to_lowercase());
         }
-        let done = if rehearsed.is_placing { "placed" } else { "grasped" };
+        let done = if rehearsed.is_placing() { "placed" } else { "grasped" };
         println!("{done} it in {} of {} attempts", rehearsed.successes(), rehearsed.attempts.len());
         if let Some(told) = rehearsed.interruption() {
             println!("{told}");

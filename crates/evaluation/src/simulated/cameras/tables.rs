@@ -5,6 +5,7 @@ use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 use super::summary::{CamerasSummary, HIGH_M, SetFigures};
 use crate::footer::FOOTER;
 use crate::simulated::tables::{Titled, document, incomplete, this_run};
+use crate::teaching_page::photos;
 
 /// All tables, the most important first.
 pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
@@ -17,10 +18,7 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
                  axis; other-sizes shows parts of 0.8, 0.9, 1.1 or 1.25 times the size, which should be refused. Errors are \
                  of the detected parts, in the marks' plane; within sigma: the share within the detection's own estimate \
                  for 68 %.",
-                match summary.photos {
-                    1 => "one photo".to_owned(),
-                    photos => format!("{photos} photos"),
-                }
+                photos(summary.photos as usize)
             ),
             table: table(&summary.sets, None),
         },

@@ -28,9 +28,13 @@ use crate::panda::FINGERTIP_BEYOND_TCP_M;
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
 /// Largest height of a part above the tool centre point; a higher part could touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
-/// Number of strips of boxes along the part's length. Chosen by hand, so that the jaws' pads, 2 cm wide, touch several
-/// boxes.
-const NUM_STRIPS: usize = 40;
+/// Maximum number of strips of boxes along the part's length, and their minimum width unless the part is shorter.
+/// Chosen by hand: the jaws' pads, 2 cm wide, touch several boxes, and a small part has few contacts.
+const MAX_STRIPS: usize = 40;
+const MIN_STRIP_M: f64 = 0.004;
+/// Maximum number of boxes: an outline with several intervals in each strip gets fewer strips. Each box on the table
+/// has four contacts, and the time of a step grows with their number.
+const MAX_BOXES: usize = 64;
 /// Minimum width of a box, because narrower boxes give no contact. Chosen by hand.
 const MIN_BOX_M: f64 = 1e-4;
 /// Maximum size of the texture: the camera would not resolve a larger one.
@@ -179,21 +183,34 @@ fn texture_of(photo: &RgbImage) -> RgbImage {
     imageops::resize(photo, scaled(photo.width()), scaled(photo.height()), FilterType::Triangle)
 }
 
+/// Centre and size of each collision box, seen from above.
+fn boxes(corners: &[Point2<f64>]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
+    let ends = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c.x), high.max(c.x)]);
+    let length_m = ends[1] - ends[0];
+    let boxes_of = |num_strips: usize| -> Vec<_> {
+        let cuts: Vec<f64> = (0..=num_strips).map(|k| ends[0] + length_m * k as f64 / num_strips as f64).collect();
+        strips(corners, &cuts)
+            .into_iter()
+            .map(|Strip { x, low, high }| {
+                let (low, high) = (0.5 * (low[0] + low[1]), 0.5 * (high[0] + high[1]));
+                (Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (low + high)), Vector2::new(x[1] - x[0], high - low))
+            })
+            .filter(|(_, size)| size.min() > MIN_BOX_M)
+            .collect()
+    };
+    let mut num_strips = ((length_m / MIN_STRIP_M) as usize).clamp(1, MAX_STRIPS);
+    let mut boxes = boxes_of(num_strips);
+    while boxes.len() > MAX_BOXES && num_strips > 1 {
+        num_strips -= 1;
+        boxes = boxes_of(num_strips);
+    }
+    boxes
+}
+
 /// Collision shapes and mass: the boxes of the strips, with uniform density.
 fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
     let Extrusion { height_m, mass_kg, friction, .. } = *extrusion;
-    let ends = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c.x), high.max(c.x)]);
-    let cuts: Vec<f64> =
-        (0..=NUM_STRIPS).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / NUM_STRIPS as f64).collect();
-    // Centre and size of each box as seen from above.
-    let boxes: Vec<(Vector2<f64>, Vector2<f64>)> = strips(corners, &cuts)
-        .into_iter()
-        .map(|Strip { x, low, high }| {
-            let (low, high) = (0.5 * (low[0] + low[1]), 0.5 * (high[0] + high[1]));
-            (Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (low + high)), Vector2::new(x[1] - x[0], high - low))
-        })
-        .filter(|(_, size)| size.min() > MIN_BOX_M)
-        .collect();
+    let boxes = boxes(corners);
     let area: f64 = boxes.iter().map(|(_, size)| size.x * size.y).sum();
     let shares: Vec<f64> = boxes.iter().map(|(_, size)| mass_kg * size.x * size.y / area).collect();
     let middle = boxes.iter().zip(&shares).map(|((at, _), m)| at * *m).sum::<Vector2<f64>>() / mass_kg;
@@ -318,6 +335,39 @@ mod tests {
         let pose = data.world_from_body(body);
         assert!(pose.translation.vector.norm() < 0.001, "{pose}");
         assert!(pose.rotation.angle() < 0.02, "{pose}");
+    }
+
+    #[test]
+    fn strips_are_4_mm_wide_and_boxes_are_at_most_64() {
+        let corners =
+            |points: &[(f64, f64)]| points.iter().map(|&(x, y)| Point2::new(1e-3 * x, 1e-3 * y)).collect::<Vec<_>>();
+        let bar = |length: f64| corners(&[(0.0, 0.0), (length, 0.0), (length, 15.0), (0.0, 15.0)]);
+        for (length_mm, num_boxes) in [(3.5, 1), (30.0, 7), (50.0, 12), (200.0, 40)] {
+            assert_eq!(boxes(&bar(length_mm)).len(), num_boxes, "{length_mm} mm");
+        }
+        // A comb with ten prongs along x.
+        let mut comb = vec![(0.0, 0.0)];
+        for prong in 0..10 {
+            let y = 8.0 * f64::from(prong);
+            comb.extend([(120.0, y), (120.0, y + 5.0), (10.0, y + 5.0), (10.0, y + 8.0)]);
+        }
+        comb.truncate(comb.len() - 2);
+        comb.push((0.0, 77.0));
+        let boxes = boxes(&corners(&comb));
+        assert!((50..=MAX_BOXES).contains(&boxes.len()), "{}", boxes.len());
+    }
+
+    #[test]
+    fn a_part_shorter_than_a_strip_has_a_body() {
+        let (photo, _) = photo();
+        let outline = Polygon {
+            vertices: [(20.0, 20.0), (23.5, 20.0), (23.5, 35.0), (20.0, 35.0)].map(|(x, y)| Point2::new(x, y)).to_vec(),
+        };
+        let grasp = GraspLine::new(Point2::new(20.5, 27.0), Point2::new(23.0, 27.0));
+        let spec =
+            ObjectSpec::extruded(&Extrusion { grasp, mass_kg: 0.001, ..extrusion(&photo, &outline, 0.012) }).unwrap();
+        let body = model(&spec).id::<Body>("object").unwrap();
+        assert_relative_eq!(model(&spec).mass_kg(body), 0.001, epsilon = 1e-9);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use rand::Rng;
 use sdg_geometry::PosedCamera;
 use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
@@ -12,6 +12,7 @@ use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
 use crate::scene::PlacedObject;
 use crate::views::shows_whole;
+use crate::views::tilted::tilted_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Heights of the camera relative to the usual one.
@@ -69,10 +70,7 @@ pub(super) fn draw_tilted(request: &mut Request<'_>, tilts_deg: Range<f64>) -> R
             let axis_rad: f64 = rng.random_range(-PI..PI);
             let offset = [0; 2].map(|_: i32| rng.random_range(-MAX_LOOK_OFFSET_M..MAX_LOOK_OFFSET_M));
             let aim = Vector3::new(at.x + offset[0], at.y + offset[1], 0.0);
-            let axis = Unit::new_normalize(Vector3::new(axis_rad.cos(), axis_rad.sin(), 0.0));
-            let tilted = UnitQuaternion::from_axis_angle(&axis, tilt_deg.to_radians());
-            let about_aim = Translation3::from(aim) * tilted * Translation3::from(-aim);
-            about_aim * camera_looking_down(aim.x, aim.y, distance_m, 0.0)
+            tilted_camera(&aim, distance_m, 0.0, axis_rad, tilt_deg)
         })
         .collect();
     let view = first_view(&mut cell, &part, places)?;

@@ -3,13 +3,14 @@
 //! All effects apply to light, not to pixel values: a picture is converted to linear light, changed, and converted back
 //! with sRGB's curve.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use image::RgbImage;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
 use super::request::{AxisParameter, Request};
+use crate::normal::Normal;
 
 /// Largest and smallest exposure as a fraction of the usual one; between them, the logarithm is uniformly distributed.
 const EXPOSURES: [f64; 2] = [0.25, 0.02];
@@ -173,24 +174,6 @@ pub(super) fn tint(image: &mut RgbImage, request: &mut Request<'_>) -> AxisParam
         value: strength.exp(),
         unit: "between red and blue",
         description: format!("light times {:.2} red, {:.2} green, {:.2} blue", gains[0], gains[1], gains[2]),
-    }
-}
-
-/// Samples of the standard normal distribution, two at a time (Box and Muller, 1958).
-#[derive(Default)]
-struct Normal {
-    spare: Option<f64>,
-}
-
-impl Normal {
-    fn sample(&mut self, rng: &mut Pcg64Mcg) -> f64 {
-        if let Some(spare) = self.spare.take() {
-            return spare;
-        }
-        let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-        let (sin, cos) = (TAU * rng.random::<f64>()).sin_cos();
-        self.spare = Some(radius * sin);
-        radius * cos
     }
 }
 

@@ -9,6 +9,7 @@ use super::axis_name::Axis;
 use crate::camera::CameraView;
 use crate::objects::ObjectSpec;
 use crate::scene::{SceneVariation, VariationConfig};
+use crate::views::seed::seed_of;
 use crate::workcell::Workcell;
 
 /// Number of pictures of an axis, which is the number of strata.
@@ -39,16 +40,7 @@ pub(super) struct Request<'a> {
 
 impl<'a> Request<'a> {
     pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
-        // FNV-1a gives each part its own seed, so that one unfavourable lamp does not affect all parts.
-        let part = spec
-            .name
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-        let mut rng = Pcg64Mcg::seed_from_u64(
-            part ^ seed.wrapping_mul(0xd134_2543_de82_ef95)
-                ^ (axis as u64) << 56
-                ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15),
-        );
+        let mut rng = Pcg64Mcg::seed_from_u64(seed_of(spec.name.bytes(), number, seed) ^ ((axis as u64) << 56));
         let scene_seed = rng.random();
         let stratum = (number % PICTURES_PER_AXIS) as f64;
         let level = (stratum + rng.random_range(0.0..1.0)) / PICTURES_PER_AXIS as f64;
