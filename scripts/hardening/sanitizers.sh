@@ -23,7 +23,7 @@ if [ "$kind" = thread ]; then
     RUSTFLAGS+=" -Clink-arg=-fuse-ld=lld -Clink-arg=-B$llvm/bin"
 fi
 # Leaks are ignored, because threads outlive their tests.
-export ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=halt_on_error=0
+export ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS="halt_on_error=0 suppressions=$PWD/scripts/hardening/tsan.txt"
 for package in $packages; do
     "$cargo" test --release --locked "${build_std[@]}" --target "$host" --package "$package" --lib --tests
 done
