@@ -28,10 +28,12 @@ use crate::panda::FINGERTIP_BEYOND_TCP_M;
 const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
 /// Largest height of a part above the tool centre point; a higher part could touch the palm.
 const MAX_ABOVE_TCP_M: f64 = 0.03;
-/// Maximum number of strips of boxes along the part's length, and their minimum width unless the part is shorter.
-/// Chosen by hand: the jaws' pads, 2 cm wide, touch several boxes, and a small part has few contacts.
+/// Width of the strips of boxes along the part's length, whose number is limited. Chosen by hand, so that the jaws'
+/// pads, 2 cm wide, touch several boxes: every strip between them has up to 16 contacts. Fewer strips have too few
+/// contacts: MuJoCo's contacts are soft on a light part, and the fingers passed through a single box of 1 g.
+const STRIP_M: f64 = 0.004;
+const MIN_STRIPS: usize = 8;
 const MAX_STRIPS: usize = 40;
-const MIN_STRIP_M: f64 = 0.004;
 /// Maximum number of boxes: an outline with several intervals in each strip gets fewer strips. Each box on the table
 /// has four contacts, and the time of a step grows with their number.
 const MAX_BOXES: usize = 64;
@@ -198,9 +200,9 @@ fn boxes(corners: &[Point2<f64>]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
             .filter(|(_, size)| size.min() > MIN_BOX_M)
             .collect()
     };
-    let mut num_strips = ((length_m / MIN_STRIP_M) as usize).clamp(1, MAX_STRIPS);
+    let mut num_strips = ((length_m / STRIP_M) as usize).clamp(MIN_STRIPS, MAX_STRIPS);
     let mut boxes = boxes_of(num_strips);
-    while boxes.len() > MAX_BOXES && num_strips > 1 {
+    while (boxes.is_empty() || boxes.len() > MAX_BOXES) && num_strips > 1 {
         num_strips -= 1;
         boxes = boxes_of(num_strips);
     }
@@ -338,11 +340,11 @@ mod tests {
     }
 
     #[test]
-    fn strips_are_4_mm_wide_and_boxes_are_at_most_64() {
+    fn strips_are_4_mm_wide_and_numbers_are_limited() {
         let corners =
             |points: &[(f64, f64)]| points.iter().map(|&(x, y)| Point2::new(1e-3 * x, 1e-3 * y)).collect::<Vec<_>>();
         let bar = |length: f64| corners(&[(0.0, 0.0), (length, 0.0), (length, 15.0), (0.0, 15.0)]);
-        for (length_mm, num_boxes) in [(3.5, 1), (30.0, 7), (50.0, 12), (200.0, 40)] {
+        for (length_mm, num_boxes) in [(0.45, 4), (3.5, 8), (30.0, 8), (50.0, 12), (200.0, 40)] {
             assert_eq!(boxes(&bar(length_mm)).len(), num_boxes, "{length_mm} mm");
         }
         // A comb with ten prongs along x.
@@ -358,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_shorter_than_a_strip_has_a_body() {
+    fn a_part_shorter_than_4_mm_has_a_body() {
         let (photo, _) = photo();
         let outline = Polygon {
             vertices: [(20.0, 20.0), (23.5, 20.0), (23.5, 35.0), (20.0, 35.0)].map(|(x, y)| Point2::new(x, y)).to_vec(),
