@@ -181,8 +181,18 @@ fn one(
             line["left"] = json!(left);
             fs::remove_dir_all(&after)?;
         }
-        // The folder stays for inspection.
-        Err(error) => line["fault"] = json!(format!("{error:#}")),
+        Err(error) => {
+            line["fault"] = json!(format!("{error:#}"));
+            // For inspection; the next kill uses a flakey disk again.
+            let kept = reference.with_file_name(format!("after-{number}"));
+            if kept != after {
+                for (file, content) in contents_under(&after)? {
+                    let copy = kept.join(file);
+                    fs::create_dir_all(copy.parent().unwrap_or(&kept))?;
+                    fs::write(copy, content)?;
+                }
+            }
+        }
     }
     Ok(line)
 }

@@ -8,7 +8,7 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of the masked area | likewise |
 //! | S | none | search for the demonstration in the whole image | likewise |
 
-mod candidate;
+pub(crate) mod candidate;
 mod comparison;
 mod consistency;
 mod keypoints;

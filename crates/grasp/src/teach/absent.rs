@@ -17,7 +17,7 @@ use sdg_demonstration::{
 };
 use sdg_detection::config::ResizeRule;
 use sdg_detection::image_transform::resized_size;
-use sdg_geometry::{BoundingBox, percentile};
+use sdg_geometry::{BoundingBox, Polygon, percentile};
 
 use super::options::TeachOptions;
 use crate::decimal::decimal;
@@ -25,6 +25,8 @@ use crate::error::{GraspError, Result};
 use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
+use crate::models::candidate::PoseCandidate;
+use crate::region::SearchRegion;
 use crate::taught::TaughtDemonstration;
 
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
@@ -110,20 +112,30 @@ impl AbsentSamples {
     }
 }
 
-/// The network's highest score in each picture; 0 without a candidate.
+/// The network's highest score in the searched region of each picture; 0 without a candidate. Plan views, and pictures
+/// that do not contain the region, count whole.
 ///
 /// # Errors
 /// A picture that is invalid for the network.
 pub(super) fn highest_scores(
     network: &Network,
     demonstrations: &[TaughtDemonstration],
-    pictures: &[RgbImage],
+    options: &TeachOptions,
 ) -> Result<Vec<f64>> {
-    let highest = |picture| {
+    let highest = |picture: &RgbImage| {
+        let region = region(options).filter(|region| region.check(picture.dimensions().into()).is_ok());
+        let is_searched = |candidate: &&PoseCandidate| {
+            region.is_none_or(|region| region.has(&candidate.grasp.center(), &Polygon::from_box(&candidate.bbox)))
+        };
         let proposals = network.proposals(picture, demonstrations)?;
-        Ok(proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score))
+        Ok(proposals.candidates.iter().find(is_searched).map_or(0.0, |candidate| candidate.network_score))
     };
-    pictures.iter().map(highest).collect()
+    options.negatives.iter().map(highest).collect()
+}
+
+/// The region of the pictures without the part. It is in pixels of the camera's pictures: plan views have none.
+fn region(options: &TeachOptions) -> Option<SearchRegion> {
+    options.region.filter(|_| options.lengths.is_none())
 }
 
 /// The model with scores reduced until the pictures without the part (within the searched region) are refused, but only
@@ -139,8 +151,7 @@ pub(super) fn calibrated(
 ) -> Result<(GraspModel, Vec<AcceptedNegative>)> {
     // Pictures of a model with known lengths are plan views.
     let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
-    // The region is in pixels of the camera's pictures: plan views count whole.
-    let in_region = as_used.clone().with_region(options.region.filter(|_| options.lengths.is_none()))?;
+    let in_region = as_used.clone().with_region(region(options))?;
     let best = |picture: &RgbImage| match best_log_odds(&in_region, picture, |_| true) {
         // A picture that the region does not fit, such as one of another size, also counts whole.
         Err(GraspError::Region(_)) => best_log_odds(&as_used, picture, |_| true),

@@ -321,7 +321,7 @@ pub(crate) fn teach_network(
     )?;
     let network = finished(&detector)?;
     let mut on_other_parts = other_parts::shown(alone, &to_hold_back, &network, options.seed)?;
-    on_other_parts.highest.extend(absent::highest_scores(&network, &of_any_size, &options.negatives)?);
+    on_other_parts.highest.extend(absent::highest_scores(&network, &of_any_size, options)?);
     let is_kept = |(record, _): &(&ValidationRecord, &Vec<Proposals>)| record.steps_done == history.best.steps_done;
     let Some((_, proposals)) = history.validations.iter().zip(&proposed).find(is_kept) else {
         panic!("the network that is kept was validated")

@@ -285,12 +285,9 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     /// Resets the load of the empty hand: an earlier program may have ended before it did so.
     fn reset_load(&mut self) -> Steps<()> {
-        if self.cell.config.load.is_some() {
-            // An arm that may not move may refuse the load, without the reason why it may not move.
-            self.robot.ready()?;
-            self.robot.set_load(Load::NONE)?;
-        }
-        Ok(())
+        // An arm that may not move may refuse the load, without the reason why it may not move.
+        self.robot.ready()?;
+        Ok(self.robot.set_load(Load::NONE)?)
     }
 
     /// Moves above a found part, grasps it, lifts it and holds it.

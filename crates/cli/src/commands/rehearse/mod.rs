@@ -39,7 +39,8 @@ pub struct RehearseArgs {
     pub camera: Option<PathBuf>,
     /// Put the part down at this place of the workcell file: NAME, or NAME:CELL for one cell of a tray; with NAME
     /// alone, the tray's cells are used one after another. An attempt succeeds if the part is within 3 mm and 3° of its
-    /// place or, for a bin, inside it, both by the last picture and by its true pose
+    /// place, by the last picture and by its true pose; for a bin, if it is inside it, by its true pose and, if the
+    /// last picture shows it, by this picture
     #[arg(long, value_name = "NAME", requires = "workcell")]
     pub place: Option<String>,
     /// The workcell file, with places and obstacles

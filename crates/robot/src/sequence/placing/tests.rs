@@ -329,7 +329,9 @@ fn the_load_of_an_earlier_program_is_reset_before_anything_moves() {
     cell.loads_kg.push(0.5);
     let (mut first, camera) = (FirstLoads(None), CameraPose::InBase(Isometry3::identity()));
     let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
-    grasp(&mut robot, &mut Truth, &mut first, camera, &config()).unwrap();
+    // Also if this workcell names no mass.
+    let config = GraspConfig { load: None, ..config() };
+    grasp(&mut robot, &mut Truth, &mut first, camera, &config).unwrap();
     assert_eq!(first.0, Some(vec![0.5, 0.0]));
 }
 
