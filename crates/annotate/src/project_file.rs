@@ -328,9 +328,10 @@ impl ProjectFile {
 
     /// Whether the project only consists of a photo, which needs no file.
     fn is_bare(&self) -> bool {
-        let Self { label, tried, removed, models, photos, searched, .. } = self;
+        let Self { label, tried, removed, models, photos, marks, searched, .. } = self;
         let is_set = matches!(searched, Some(Searched::Part(_)));
-        label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2 && !is_set
+        let has_files = photos.len() > 1 || !(tried.is_empty() && removed.is_empty() && marks.is_empty());
+        label.is_none() && models.is_empty() && !has_files && !is_set
     }
 
     /// Writes the file. For a photo without any work on it, no file is written.
