@@ -266,8 +266,9 @@ def teach(
     (left, upper, width, height) in pixels of the photo. camera: the file of the calibrated camera that took the photo,
     for grasps in metres. mark_height_mm, grasp_height_mm: heights of the marks and of the grasp above the table, with a
     camera; grasp_height_mm defaults to half of mark_height_mm. negatives: files of pictures without the part; a warning
-    names each one in which the model still accepts something. more_demos: further photos of the part, each with its
-    marks, like photo and marks.
+    names each one in which the model still accepts something. Where warnings are errors, the model would be lost:
+    then call this within `warnings.catch_warnings()`, after `warnings.simplefilter("default")`. more_demos: further
+    photos of the part, each with its marks, like photo and marks.
 
     Raises FileError, PictureError, TeachingError, CameraError, RegionError and ArgumentError.
     """

@@ -206,7 +206,7 @@ export function proposeOutline(options = {}) {
 
 async function detectOutline(target, { quietly = false, isStroke = false }) {
   const { base, strokes: earlier, box: drawn } = isStroke ? howFound(target) : { base: null, strokes: [], box: null };
-  const added = isStroke ? [...target.waiting] : [];
+  let added = isStroke ? [...target.waiting] : [];
   // No stroke waits any more: all were answered together, or taken back. Or the user did not ask for an outline, and has made one or removed the box.
   if (isStroke ? !added.length : quietly && (target.marks.outline || !target.marks.box)) return;
   const own = boxOf(target);
@@ -227,8 +227,9 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
   try {
     const said = strokes.map(({ points, isInside }) => ({ points, is_inside: isInside }));
     const { outline } = await api.proposeOutline(target.id, box, said, base);
-    // An answer about a box or an outline that has changed in the meantime is discarded, and strokes taken back do not count.
-    const waited = target === image() && about() === asked && added.every((stroke) => target.waiting.includes(stroke));
+    // Strokes taken back do not count. After another change of the box or the outline, the answer is asked for again.
+    const isWanted = target === image() && added.every((stroke) => target.waiting.includes(stroke));
+    const waited = isWanted && about() === asked;
     if (waited && !outline) {
       if (!quietly) toast("Nothing in the box differs from its surroundings. Draw the outline by hand.");
     } else if (waited) {
@@ -253,7 +254,10 @@ async function detectOutline(target, { quietly = false, isStroke = false }) {
       } else if (!last.isInside && before && areaOf(outline) < MUCH_LEFT * areaOf(before)) {
         toast("“Out” removed much of the outline.", back);
       }
-    } else if (quietly && target === image()) proposeOutline({ quietly });
+    } else if (isWanted && boxOf(target)) {
+      added = [];
+      proposeOutline({ quietly, isStroke });
+    }
   } catch (error) {
     if (!quietly) toast(error.message);
   }

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use sdg_demonstration::PixelFrame;
+use sdg_files::absolute;
 use serde::Serialize;
 
 use crate::error::{Error, Result, TeacherError};
 use crate::model_versions::fingerprint;
-use crate::names::{absolute, file_name, safe_stem};
+use crate::names::{file_name, safe_stem};
 use crate::picture::Picture;
 use crate::project_file::label_of;
 use crate::recent::{RecentProject, RecentProjects};

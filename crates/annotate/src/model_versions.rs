@@ -15,11 +15,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use sdg_files::write_atomically;
+use sdg_files::{absolute, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::names::{absolute, free_numbered, relative};
+use crate::names::{free_numbered, relative};
 use crate::teacher::TaughtSummary;
 
 /// Maximum size of a model file.

@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::IMAGE_EXTENSIONS;
-use sdg_files::marks_of_photo;
+use sdg_files::{absolute, absolute_folder, marks_of_photo};
 
 /// Name of a project's file in its folder, and extension of the file of a photo's project.
 pub const PROJECT_FILE: &str = "sdg-project.json";
@@ -18,14 +18,8 @@ pub fn file_name(path: &Path) -> String {
 
 /// The name of a path in a project's file: relative to the folder if it is inside, otherwise absolute.
 pub fn relative(folder: &Path, path: &Path) -> String {
-    let (folder, path) = (absolute(folder), absolute(path));
+    let (folder, path) = (absolute_folder(folder), absolute(path));
     path.strip_prefix(&folder).unwrap_or(&path).to_string_lossy().into_owned()
-}
-
-/// The absolute path, for comparisons; that of an empty path is the current folder.
-pub fn absolute(path: &Path) -> PathBuf {
-    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// The natural order of two names, the same as on the page: numbers by value (2 before 10), letters without regard to
@@ -169,7 +163,7 @@ mod tests {
         let here = std::env::current_dir().unwrap();
         let name = |folder: &str, path: &str| relative(Path::new(folder), Path::new(path));
         for folder in ["", ".", here.to_str().unwrap()] {
-            for path in ["a.png", "./a.png", here.join("a.png").to_str().unwrap()] {
+            for path in ["a.png", "./a.png", "src/../a.png", here.join("a.png").to_str().unwrap()] {
                 assert_eq!(name(folder, path), "a.png", "{path} in {folder}");
             }
         }

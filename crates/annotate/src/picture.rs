@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, RgbImage};
 use sdg_demonstration::{ImageLimits, PictureError, PixelFrame, decode_image_in, is_turned_by_exif};
+use sdg_files::is_same_path;
 
 use crate::error::{Error, Result};
-use crate::names::{absolute, file_name, is_picture_name, natural_order};
+use crate::names::{file_name, is_picture_name, natural_order};
 
 /// Maximum size of a photo's file.
 pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
@@ -31,7 +32,7 @@ pub struct Picture {
 impl Picture {
     /// Whether the picture's file is at this path, in any spelling.
     pub fn is_at(&self, path: &Path) -> bool {
-        absolute(&self.path) == absolute(path)
+        is_same_path(&self.path, path)
     }
 
     /// Reads and decodes the file once, so that any error is reported now.

@@ -19,13 +19,13 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::PixelFrame;
-use sdg_files::write_atomically;
+use sdg_files::{absolute_folder, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
-use crate::names::{PROJECT_FILE, absolute, relative};
+use crate::names::{PROJECT_FILE, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::region::Searched;
 
@@ -68,9 +68,7 @@ impl ProjectPlace {
     /// The project's path for display and comparison, the same for every spelling: the folder, or the file of a photo's
     /// project.
     pub fn shown(&self) -> String {
-        let folder = fs::canonicalize(if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder });
-        // A folder is the same with a slash at its end.
-        let folder = folder.unwrap_or_else(|_| absolute(&self.folder).components().collect());
+        let folder = absolute_folder(&self.folder);
         match self.file.file_name() {
             Some(name) if name != PROJECT_FILE => folder.join(name).display().to_string(),
             _ => folder.display().to_string(),
@@ -222,6 +220,7 @@ impl ProjectFile {
         let mut photos = BTreeSet::new();
         self.photos = self.photos.iter().map(name).filter(|photo| photos.insert(photo.clone())).collect();
         self.removed = self.removed.iter().map(name).collect();
+        self.marks = self.marks.iter().map(|(photo, file)| (name(photo), name(file))).collect();
         let mut tried = BTreeSet::new();
         for one in std::mem::take(&mut self.tried) {
             let one = Tried { file: name(&one.file), became: one.became.as_ref().map(name), ..one };
@@ -328,9 +327,10 @@ impl ProjectFile {
 
     /// Whether the project only consists of a photo, which needs no file.
     fn is_bare(&self) -> bool {
-        let Self { label, tried, removed, models, photos, searched, .. } = self;
+        let Self { label, tried, removed, models, photos, marks, searched, .. } = self;
         let is_set = matches!(searched, Some(Searched::Part(_)));
-        label.is_none() && tried.is_empty() && removed.is_empty() && models.is_empty() && photos.len() < 2 && !is_set
+        let has_files = photos.len() > 1 || !(tried.is_empty() && removed.is_empty() && marks.is_empty());
+        label.is_none() && models.is_empty() && !has_files && !is_set
     }
 
     /// Writes the file. For a photo without any work on it, no file is written.

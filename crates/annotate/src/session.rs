@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sdg_demonstration::{Demonstration, ModelKind, PixelFrame};
-use sdg_files::{FileError, WriterLock};
+use sdg_files::WriterLock;
 use tempfile::TempDir;
 
 use crate::error::{Error, Result};
@@ -119,23 +119,23 @@ impl Session {
         self
     }
 
-    /// Locks the marks of all photos against other processes, unless this session has locked them.
+    /// Locks the marks of a photo against other processes before they are written, unless this session has locked them.
+    /// Returns whether another process has changed them since they were read; they are then read again.
     ///
     /// # Errors
-    /// Another process has locked a file.
-    pub fn lock_photos(&self) -> std::result::Result<(), FileError> {
-        let state = self.state();
-        state.photos().try_for_each(|photo| self.lock_marks(&state, &photo.picture.path))
-    }
-
-    /// Locks the marks of a photo against other processes, unless this session has locked them.
-    fn lock_marks(&self, state: &State, photo: &Path) -> std::result::Result<(), FileError> {
+    /// Another process has locked the file, too many files are open, or changed marks cannot be read.
+    fn lock_marks(&self, state: &mut State, photo: &Path) -> Result<bool> {
         let file = state.marks_file(photo).unwrap_or_else(|| photo.with_extension("json"));
-        let mut locks = self.locks();
-        if !locks.iter().any(|lock| lock.is_of(&file)) {
-            locks.extend(WriterLock::take(&file)?);
+        if self.locks().iter().any(|lock| lock.is_of(&file)) {
+            return Ok(false);
         }
-        Ok(())
+        let Some(lock) = WriterLock::take(&file)? else { return Ok(false) };
+        let is_changed = match state.image_at(photo) {
+            Some(id) => state.read_again(id)?,
+            None => false,
+        };
+        self.locks().push(lock);
+        Ok(is_changed)
     }
 
     fn locks(&self) -> MutexGuard<'_, Vec<WriterLock>> {
@@ -184,10 +184,15 @@ impl Session {
     /// Stores new marks of a picture, and writes them to the file if they are valid.
     ///
     /// # Errors
-    /// Unknown picture.
+    /// Unknown picture, or another process has locked or changed its marks.
     pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
-        state.image(id)?;
+        let photo = state.image(id)?.picture.path.clone();
+        if self.lock_marks(&mut state, &photo)? {
+            return Err(Error::Busy(
+                "another program changed these marks; they were read again, without the change here",
+            ));
+        }
         state.images[id].marks = marks;
         state.save(id);
         Ok(state.image_view(id))
@@ -196,19 +201,29 @@ impl Session {
     /// Renames the object, also in all files already written.
     ///
     /// # Errors
-    /// The name is empty, too long or contains control characters, or the project cannot be written.
+    /// The name is empty, too long or contains control characters, the project cannot be written, or another process
+    /// has locked the marks of a photo, in which the name then stays.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = check_label(label)?;
         let mut state = self.state();
         label.clone_into(&mut state.label);
         state.is_named = true;
         state.save_project()?;
+        let mut renamed = Ok(());
+        let num_locks = self.locks().len();
         for id in state.image_ids().collect::<Vec<_>>() {
             if matches!(state.images[id].saved, Saved::Written { .. }) {
-                state.save(id);
+                let photo = state.images[id].picture.path.clone();
+                match self.lock_marks(&mut state, &photo) {
+                    Ok(_) => state.save(id),
+                    Err(error) => renamed = Err(error),
+                }
+                // The locks of all photos of a large project would be more files than a process can open.
+                self.locks().truncate(num_locks);
             }
         }
         drop(state);
+        renamed?;
         Ok(self.view())
     }
 
@@ -337,7 +352,6 @@ impl Session {
         // The lock is held until the photo is written, so that the next photo gets another name.
         let mut state = self.state();
         let path = self.next_photo()?;
-        self.lock_marks(&state, &path)?;
         sdg_files::write_atomically(&path, &bytes)?;
         let size = [frame.width(), frame.height()];
         let picture = Picture { name: file_name(&path), path, size, frame: self.pixel_frame };

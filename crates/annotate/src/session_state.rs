@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, Demonstration, ImageFacts, ModelKind};
+use sdg_files::is_same_path;
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::advice::advise;
@@ -11,7 +13,7 @@ use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, fingerprint};
-use crate::names::{absolute, file_name, relative};
+use crate::names::{file_name, relative};
 use crate::picture::Picture;
 use crate::project_file::{Gone, ProjectFile, ProjectPlace, Tried};
 use crate::region::{Region, Searched};
@@ -102,8 +104,7 @@ impl State {
     /// The picture is a photo already, the file beside it contains no marks of it or belongs to another photo, or an
     /// Exif orientation rotates a photo of a calibrated camera.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
-        let path = absolute(&picture.path);
-        let known = self.images.iter().position(|image| absolute(&image.picture.path) == path);
+        let known = self.image_at(&picture.path);
         let mut image = match known.map(|id| &self.images[id]) {
             Some(image) if !image.is_removed => {
                 return Err(Error::Busy("this picture is a demonstration already"));
@@ -142,6 +143,26 @@ impl State {
     pub fn marks_file(&self, photo: &Path) -> Option<PathBuf> {
         let folder = &self.place.as_ref()?.folder;
         self.marks_files.get(&relative(folder, photo)).map(|file| folder.join(file))
+    }
+
+    /// The number of the photo with this path, which may have been removed.
+    pub fn image_at(&self, path: &Path) -> Option<usize> {
+        self.images.iter().position(|image| image.picture.is_at(path))
+    }
+
+    /// Reads a photo's marks again and returns whether they differ from the known ones, which they then replace. Marks
+    /// that could not be written are kept.
+    ///
+    /// # Errors
+    /// As [`MarkedPicture::of`].
+    pub fn read_again(&mut self, id: usize) -> Result<bool> {
+        let known = &self.images[id];
+        let (now, _) = self.open_photo(known.picture.clone())?;
+        let is_kept = matches!(known.saved, Saved::Refused { .. }) || rounded(&now.marks) == rounded(&known.marks);
+        if !is_kept {
+            self.images[id] = MarkedPicture { is_removed: known.is_removed, ..now };
+        }
+        Ok(!is_kept)
     }
 
     pub fn save(&mut self, id: usize) {
@@ -212,8 +233,7 @@ impl State {
     }
 
     /// [`fingerprint`] of the inputs that a teaching would have now. Pictures are named as in the project's file, so
-    /// that it does not depend on the folder's path. Coordinates are rounded to a thousandth of a pixel: after reading
-    /// from a file their last digits differ.
+    /// that it does not depend on the folder's path. Coordinates are [`rounded`].
     pub fn material(&self) -> String {
         // Without a project there is neither a photo nor a model.
         let folder = self.place.as_ref().map_or(Path::new(""), |place| &place.folder);
@@ -221,9 +241,7 @@ impl State {
         let marked = self.photos().filter(|image| image.marks != Marks::default());
         let marked: Vec<_> = marked.map(|image| (name(&image.picture), &image.marks)).collect();
         let negatives: Vec<_> = self.negatives().map(name).collect();
-        let mut material = serde_json::to_value((marked, negatives)).unwrap_or_default();
-        round(&mut material);
-        fingerprint(&material.to_string())
+        fingerprint(&rounded(&(marked, negatives)).to_string())
     }
 
     pub fn model_views(&self) -> Vec<ModelView> {
@@ -281,6 +299,13 @@ impl State {
     }
 }
 
+/// A value with coordinates rounded to a thousandth of a pixel: after reading from a file their last digits differ.
+fn rounded(value: &impl Serialize) -> Value {
+    let mut value = serde_json::to_value(value).unwrap_or_default();
+    round(&mut value);
+    value
+}
+
 /// Rounds all numbers to thousandths.
 fn round(value: &mut Value) {
     match value {
@@ -322,8 +347,7 @@ impl MarkedPicture {
     /// # Errors
     /// [`Error::SharedMarks`].
     pub fn check_file<'a>(&self, mut photos: impl Iterator<Item = &'a Self>) -> Result<()> {
-        let [file, picture] = [&self.file, &self.picture.path].map(|path| absolute(path));
-        match photos.find(|other| absolute(&other.file) == file && absolute(&other.picture.path) != picture) {
+        match photos.find(|other| is_same_path(&other.file, &self.file) && !other.picture.is_at(&self.picture.path)) {
             Some(other) => Err(Error::SharedMarks {
                 name: self.picture.name.clone(),
                 path: self.file.clone(),

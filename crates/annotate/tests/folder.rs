@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::served::{InPlace, Served, photo, photo_png};
 use image::codecs::png::PngEncoder;
 use image::{ImageEncoder, RgbImage};
-use sdg_annotate::{Session, SessionOptions};
+use sdg_annotate::{Marks, Session, SessionOptions};
 use sdg_demonstration::PixelFrame;
 use serde_json::{Value, json};
 
@@ -135,11 +135,35 @@ fn the_file_of_a_photo_s_marks_is_recorded() {
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("marked.json"), LABELME).unwrap();
     let given = vec![(at("rod.png"), None), (at("other.png"), Some(at("marked.json")))];
-    for images in [given, vec![(at("rod.png"), None)]] {
+    let open = |images: Vec<_>| {
         let options = SessionOptions { images, ..SessionOptions::default() };
-        let view = Session::open(&options, Arc::new(InPlace)).unwrap().view();
-        assert_eq!(view.images[1].marks.bbox, Some([40.0, 40.0, 140.0, 60.0]));
+        Session::open(&options, Arc::new(InPlace)).unwrap()
+    };
+    let rod = || vec![(at("rod.png"), None)];
+    let bbox = Some([40.0, 40.0, 140.0, 60.0]);
+    for (images, num_notes) in [(given, 0), (rod(), 1)] {
+        let view = open(images).view();
+        assert_eq!((view.images[1].marks.bbox, view.notes.len()), (bbox, num_notes), "{:?}", view.notes);
     }
+    assert_eq!(open(rod()).view().notes, ["The marks of other.png are in marked.json."]);
+    // Without the recorded file, the marks are those beside the photo.
+    std::fs::rename(at("marked.json"), at("other.json")).unwrap();
+    let view = open(rod()).view();
+    assert_eq!((view.images[1].marks.bbox, view.notes.len()), (bbox, 0), "{:?}", view.notes);
+}
+
+#[test]
+fn a_new_file_of_a_single_photo_s_marks_is_recorded() {
+    let folder = folder_of(&["rod.png"]);
+    let at = |name: &str| folder.path().join(name);
+    let open = |marks| {
+        let options = SessionOptions { images: vec![(at("rod.png"), marks)], ..SessionOptions::default() };
+        Session::open(&options, Arc::new(InPlace)).unwrap()
+    };
+    let marks = Marks { bbox: Some([40.0, 40.0, 140.0, 60.0]), ..Marks::default() };
+    open(Some(at("new.json"))).set_marks(0, marks.clone()).unwrap();
+    assert!(at("new.json").exists());
+    assert_eq!(open(None).marks(0).unwrap(), marks);
 }
 
 #[test]

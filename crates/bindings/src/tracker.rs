@@ -29,8 +29,8 @@ impl Tracker {
     /// later, identically on every machine; otherwise as soon as the search has ended.
     ///
     /// # Errors
-    /// The errors of [`Model::perception`]; the number of threads is invalid, or the system refuses them; the process was
-    /// forked from one with threads of this library.
+    /// The errors of [`Model::perception`]; the number of threads is invalid, or the system refuses them; the process
+    /// was forked from one with threads of this library.
     pub fn new(model: &Model, view: &View, search_frames: Option<u32>) -> Result<Self> {
         let perception = on_threads(view.threads, || model.perception(view.camera.as_ref(), view.region))??;
         let as_it_takes = SearchTime::AsItTakes { threads: view.threads };
@@ -43,8 +43,8 @@ impl Tracker {
     /// any fixed time.
     ///
     /// # Errors
-    /// The tracker was closed; the time is before that of the last frame, the picture's size differs from the camera's, or the region is not
-    /// inside the picture; a search fails; the errors of threads as for [`Model::detect`].
+    /// The tracker was closed; the time is before that of the last frame, the picture's size differs from the camera's,
+    /// or the region is not inside the picture; a search fails; the errors of threads as for [`Model::detect`].
     pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
         let Some(tracker) = self.tracker.as_mut() else {
             return Err(Fault::new(FaultKind::Closed, "expected a tracker that is open, found one that was closed"));

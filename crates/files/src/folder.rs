@@ -37,6 +37,28 @@ pub(crate) fn folder_of(file: &Path) -> &Path {
     }
 }
 
+/// The absolute path of a folder without links and `..`, for comparisons; these remain in that of a missing folder.
+/// That of an empty path is the current folder.
+pub fn absolute_folder(folder: &Path) -> PathBuf {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let spelled = || std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    // A folder is the same with a slash at its end.
+    folder.canonicalize().unwrap_or_else(|_| spelled().components().collect())
+}
+
+/// The absolute path of a file, for comparisons: its name in [`absolute_folder`]. A link to a file is another file.
+pub fn absolute(file: &Path) -> PathBuf {
+    match file.file_name() {
+        Some(name) => absolute_folder(folder_of(file)).join(name),
+        None => absolute_folder(file),
+    }
+}
+
+/// Whether two paths name the same file, which need not exist. Different names are told apart without a system call.
+pub fn is_same_path(one: &Path, other: &Path) -> bool {
+    one.file_name() == other.file_name() && absolute(one) == absolute(other)
+}
+
 /// Creates a folder (and its parents) if missing, and checks that files can be written to it.
 ///
 /// # Errors

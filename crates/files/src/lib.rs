@@ -42,7 +42,7 @@ pub use atomic::{AtomicFile, write_atomically};
 pub use bounded::{read, read_bounded};
 pub use drawing::{write_drawing, write_png};
 pub use error::{FileError, Result};
-pub use folder::{entries, has_extension, prepare_folder};
+pub use folder::{absolute, absolute_folder, entries, has_extension, is_same_path, prepare_folder};
 pub use inputs::{
     check_extendable, check_readable, check_replaceable, check_writable, create, extend, is_same_file, keep, write,
 };

@@ -1,10 +1,11 @@
 //! Locks between processes. The system releases a lock when its process ends, however it ends.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{FileError, Result};
+use crate::folder::is_same_path;
 
 /// Access of a lock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +48,10 @@ fn try_lock(file: File, access: Access) -> (File, bool) {
     (file, !matches!(locked, Err(TryLockError::WouldBlock)))
 }
 
+/// Errors of a folder in which no lock file can be made; too many open files are none of them.
+const NOT_WRITABLE: [ErrorKind; 4] =
+    [ErrorKind::NotFound, ErrorKind::PermissionDenied, ErrorKind::ReadOnlyFilesystem, ErrorKind::InvalidFilename];
+
 /// An exclusive lock for writing a file. A hidden file beside it carries the lock and names the holder. The hidden file
 /// is removed at the end; if it remains, the next holder takes it over.
 #[derive(Debug)]
@@ -59,13 +64,16 @@ impl WriterLock {
     /// Takes the lock for a file that will be written; `None` if the folder is not writable.
     ///
     /// # Errors
-    /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if the holder's name cannot be
-    /// written.
+    /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if too many files are open or the
+    /// holder's name cannot be written.
     pub fn take(written: &Path) -> Result<Option<Self>> {
         let path = lock_file_of(written);
         loop {
-            let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
-            let Ok(file) = file else { return Ok(None) };
+            let file = match OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path) {
+                Ok(file) => file,
+                Err(error) if NOT_WRITABLE.contains(&error.kind()) => return Ok(None),
+                Err(error) => return Err(FileError::at(&path, "write")(error)),
+            };
             let (mut file, is_taken) = try_lock(file, Access::Alone);
             if !is_taken {
                 let mut holder = String::new();
@@ -88,8 +96,7 @@ impl WriterLock {
 
     /// Whether this is the lock of a file, in any spelling of its path.
     pub fn is_of(&self, written: &Path) -> bool {
-        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        absolute(&self.path) == absolute(&lock_file_of(written))
+        is_same_path(&self.path, &lock_file_of(written))
     }
 }
 
@@ -146,7 +153,15 @@ mod tests {
         let marks = folder.path().join("part.json");
         let file = folder.path().join(".part.json.lock");
         let held = WriterLock::take(&marks).unwrap();
-        assert!(held.as_ref().unwrap().is_of(&marks) && !held.as_ref().unwrap().is_of(&folder.path().join("b.json")));
+        let is_held = |name: &str| held.as_ref().unwrap().is_of(&folder.path().join(name));
+        assert!(is_held("part.json") && !is_held("b.json"));
+        fs::create_dir(folder.path().join("sub")).unwrap();
+        assert!(is_held("sub/../part.json") && !is_held("sub/part.json"));
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(folder.path(), folder.path().join("link")).unwrap();
+            assert!(is_held("link/part.json"));
+        }
         let error = WriterLock::take(&marks).err().unwrap();
         let process = format!("process {}", std::process::id());
         assert!(matches!(&error, FileError::Held { path, holder } if *path == marks && *holder == process), "{error}");

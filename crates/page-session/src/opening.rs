@@ -1,6 +1,7 @@
-//! Opens a session of the page on a user's files. The files that the page writes are locked against other processes.
+//! Opens a session of the page on a user's files. The project and the marks of the given photos are locked against
+//! other processes; the session locks the marks of further photos when it writes them.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -81,22 +82,14 @@ pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
 fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
     let (max_opening_px, pixel_frame) = (teacher.max_opening_px(), teacher.pixel_frame());
     let options = SessionOptions { max_opening_px, pixel_frame, ..options };
-    let session = Session::open(&options, Arc::new(teacher.clone()))?.holding(locks);
-    // The project may name further photos.
-    session.lock_photos().map_err(refused)?;
-    Ok(session)
+    Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
 }
 
 /// Locks files against other processes, each once. Files in a folder that is not writable are not locked.
 fn lock_all(written: impl Iterator<Item = PathBuf>) -> Result<Vec<WriterLock>> {
-    let written: BTreeSet<PathBuf> = written.collect();
-    let locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
-    Ok(locks.into_iter().flatten().collect())
-}
-
-/// Locks a file against other processes; `None` if the folder is not writable.
-fn lock(written: &Path) -> Result<Option<WriterLock>> {
-    WriterLock::take(written).map_err(refused)
+    let written: BTreeMap<PathBuf, PathBuf> = written.map(|file| (sdg_files::absolute(&file), file)).collect();
+    let locks = written.values().map(|file| WriterLock::take(file).map_err(refused));
+    Ok(locks.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
 /// The error of a lock.
@@ -115,34 +108,79 @@ mod tests {
     use super::*;
     use image::codecs::png::PngEncoder;
     use image::{ImageEncoder, RgbImage};
+    use sdg_annotate::Marks;
     use sdg_grasp::Preset;
     use sdg_inputs::camera_files::CameraFile;
 
-    #[test]
-    fn photos_of_a_project_are_locked_and_those_added_to_it() {
+    fn teacher() -> PageTeacher {
+        PageTeacher { preset: Preset::default(), camera: None }
+    }
+
+    fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        for name in ["a.png", "b.png", "c.png"] {
-            RgbImage::new(60, 40).save(at(name)).unwrap();
+        for name in names {
+            RgbImage::new(60, 40).save(folder.path().join(name)).unwrap();
         }
-        let project = r#"{"format": 1, "label": null, "photos": ["a.png", "b.png"], "tried": [], "removed": [],
-            "models": [], "current_model": null}"#;
-        std::fs::write(at("a.sdg-project.json"), project).unwrap();
-        let teacher = PageTeacher { preset: Preset::default(), camera: None };
-        let open = |name: &str| open_chosen(&teacher, &at(name)).map_err(|error| error.to_string());
-        let session = open("a.png").unwrap();
-        let is_refused = |name: &str| open(name).is_err_and(|error| error.contains("is editing these marks"));
-        assert!(is_refused("b.png") && !is_refused("c.png"));
-        let other = session.view().others[0].id;
-        session.add_photo(other).unwrap();
-        assert!(is_refused("c.png"));
-        // A photo that is removed and added again is locked already.
-        let added = session.view().images[2].id;
-        session.remove_image(added).unwrap();
-        session.view();
-        session.add_photo(other).unwrap();
+        folder
+    }
+
+    /// Opens a photo with a project of these photos.
+    fn open_with(folder: &Path, photos: &[&str]) -> Result<Session> {
+        let project = format!(
+            r#"{{"format": 1, "label": null, "photos": {photos:?}, "tried": [], "removed": [], "models": [],
+            "current_model": null}}"#
+        );
+        std::fs::write(folder.join("a.sdg-project.json"), project).unwrap();
+        open_chosen(&teacher(), &folder.join("a.png"))
+    }
+
+    #[test]
+    fn further_photos_of_a_project_are_locked_when_their_marks_are_written() {
+        let folder = folder_of(&["a.png", "b.png"]);
+        let open = |name: &str| open_chosen(&teacher(), &folder.path().join(name));
+        let is_refused = |name: &str| open(name).is_err_and(|error| error.to_string().contains("editing these marks"));
+        let marks = |left: f64| Marks { bbox: Some([left, 5.0, 50.0, 30.0]), ..Marks::default() };
+        let session = open_with(folder.path(), &["a.png", "b.png"]).unwrap();
+        assert!(is_refused("a.png"));
+        let other = open("b.png").unwrap();
+        let change = |left: f64| session.set_marks(1, marks(left)).map(drop).map_err(|error| error.to_string());
+        assert!(change(1.0).unwrap_err().contains("locked by process"));
+        other.set_marks(0, marks(2.0)).unwrap();
+        drop(other);
+        // The marks changed after they were read here.
+        assert!(change(3.0).unwrap_err().contains("another program changed these marks"));
+        assert_eq!(session.marks(1).unwrap(), marks(2.0));
+        change(4.0).unwrap();
+        assert!(is_refused("b.png"));
         drop(session);
-        assert!(!is_refused("b.png"));
+        assert_eq!(open("b.png").unwrap().marks(0).unwrap(), marks(4.0));
+    }
+
+    #[test]
+    fn a_photo_with_two_spellings_of_its_path_is_one_photo() {
+        let folder = folder_of(&["a.png", "b.png"]);
+        std::fs::create_dir(folder.path().join("sub")).unwrap();
+        let spelled = ["sub/../b.png", "b.png"].map(|name| folder.path().join(name).display().to_string());
+        let session = open_with(folder.path(), &["a.png", &spelled[0], &spelled[1]]).unwrap();
+        assert_eq!(session.view().images.len(), 2);
+    }
+
+    #[test]
+    fn a_folder_of_many_marked_photos_needs_one_lock() {
+        let names: Vec<String> = (0..20).map(|number| format!("{number}.png")).collect();
+        let folder = folder_of(&names.iter().map(String::as_str).collect::<Vec<_>>());
+        let marks = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [
+            {"label": "bar", "shape_type": "rectangle", "points": [[10, 10], [30, 20]]}]}"#;
+        for number in 0..20 {
+            std::fs::write(folder.path().join(format!("{number}.json")), marks).unwrap();
+        }
+        let session = open_chosen(&teacher(), folder.path()).unwrap();
+        assert_eq!(session.view().images.len(), 20);
+        let is_hidden = |entry: &std::fs::DirEntry| entry.file_name().as_encoded_bytes().starts_with(b".");
+        let num_locks = || std::fs::read_dir(folder.path()).unwrap().flatten().filter(is_hidden).count();
+        assert_eq!(num_locks(), 1, "the project's");
+        session.set_label("rod").unwrap();
+        assert_eq!(num_locks(), 1, "those of the renamed photos are released");
     }
 
     #[test]

@@ -21,9 +21,13 @@ export class Detector {
     this.#stop("the model was closed");
   }
 
-  /** Opens a grasp model and returns its metadata; after an error, the model before stays open. The bytes stay here. */
-  open(bytes) {
+  /**
+   * Opens the file of a grasp model and returns its metadata; after an error, the model before stays open. The bytes
+   * stay here. Files are read in turn, so that the one given last is the one opened last.
+   */
+  open(file) {
     return this.#inTurn(async () => {
+      const bytes = await file.arrayBuffer();
       const { summary } = await this.#send({ open: bytes });
       this.#model = bytes;
       this.#hasModel = true;

@@ -130,7 +130,7 @@ async function openModel(file) {
   let summary = null;
   let refused = null;
   try {
-    summary = await mine.open(await file.arrayBuffer());
+    summary = await mine.open(file);
   } catch (error) {
     refused = `${file.name}: ${error.message}`;
   }

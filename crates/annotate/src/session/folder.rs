@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use sdg_files::absolute;
+
 use super::Session;
 use crate::error::{Error, Result};
-use crate::names::{absolute, file_name, free_name};
+use crate::names::{file_name, free_name};
 use crate::picture::{Picture, pictures_in};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::views::{ImageView, OtherView, TrialPictureView};
@@ -89,24 +91,21 @@ impl Session {
     /// Makes another picture of the folder a photo of the part, with the marks beside it.
     ///
     /// # Errors
-    /// Unknown picture, marks of another picture or in another photo's file, marks that another process has locked, a
-    /// photo of a calibrated camera that an Exif orientation rotates, or the project cannot be written.
+    /// Unknown picture, marks of another picture or in another photo's file, a photo of a calibrated camera that an
+    /// Exif orientation rotates, or the project cannot be written.
     pub fn add_photo(&self, id: usize) -> Result<ImageView> {
         let mut state = self.state();
         let path = state.other(id)?.to_owned();
         // A photo that was removed and is added again keeps its number.
-        let known = state.images.iter().position(|image| image.picture.is_at(&path));
-        let id = match known {
+        let id = match state.image_at(&path) {
             Some(id) => {
                 state.images[id].check_file(state.photos())?;
-                self.lock_marks(&state, &path)?;
                 state.images[id].is_removed = false;
                 id
             }
             None => {
                 let (image, label) = state.open_photo(Picture::open(&path, self.pixel_frame)?)?;
                 image.check_file(state.photos())?;
-                self.lock_marks(&state, &path)?;
                 if let Some(label) = label.filter(|_| !state.is_named) {
                     (state.label, state.is_named) = (label, true);
                 }
@@ -156,7 +155,6 @@ impl Session {
         let extension = Path::new(shown).extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let mut state = self.state();
         let path = free_name(&self.home, shown, if extension.is_empty() { "png" } else { &extension });
-        self.lock_marks(&state, &path)?;
         sdg_files::write_atomically(&path, bytes)?;
         let (image, _) = MarkedPicture::of(Picture::open(&path, self.pixel_frame)?, None)?;
         state.images.push(image);

@@ -4,12 +4,14 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use sdg_files::absolute;
+
 use super::{Session, SessionOptions};
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
 use crate::model_versions::ModelVersions;
-use crate::names::{absolute, free_numbered, proposed_label, relative};
+use crate::names::{free_numbered, proposed_label, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::preview::Previews;
 use crate::project_file::{Gone, MAX_TRIAL_PICTURES, ProjectFile, ProjectPlace, TRIED_FOLDER, names_in_project};
@@ -43,6 +45,11 @@ impl Session {
         let mut names = BTreeSet::new();
         photos.retain(|(path, _)| names.insert(relative(&folder, path)));
         let mut marks_files = project.marks.clone();
+        // Without the recorded file, the marks are those beside the photo. A missing photo may come back with its file.
+        marks_files.retain(|photo, file| {
+            let file = folder.join(file);
+            gone.photos.contains(photo) || [file.with_extension("coco.json"), file].iter().any(|file| file.exists())
+        });
         for (path, marks) in &options.images {
             if let Some(marks) = marks {
                 marks_files.insert(relative(&folder, path), relative(&folder, marks));
@@ -56,10 +63,12 @@ impl Session {
         };
         let mut label = project.label.clone();
         let mut images = Vec::new();
+        let mut notes = Vec::new();
         for (path, annotation) in &photos {
             let is_given = options.images.iter().any(|(given, _)| given == path);
             let name = relative(&folder, path);
-            let annotation = annotation.clone().or_else(|| marks_files.get(&name).map(|file| folder.join(file)));
+            let recorded = marks_files.get(&name).filter(|_| annotation.is_none());
+            let annotation = annotation.clone().or_else(|| recorded.map(|file| folder.join(file)));
             let frame = options.pixel_frame;
             let opened = if is_given { Some(Picture::open(path, frame)?) } else { gone.open(path, frame) };
             let Some(picture) = opened else {
@@ -75,17 +84,20 @@ impl Session {
                 gone.photos.push(name);
                 continue;
             }
+            notes.extend(recorded.map(|file| format!("The marks of {name} are in {file}.")));
             label = label.take().or(named);
             images.push(image);
         }
         // The first photo is the reference: opening another one changes neither the order nor the model's age.
         let name = |image: &MarkedPicture| relative(&folder, &image.picture.path);
-        let place_of = |image: &MarkedPicture| project.photos.iter().position(|known| *known == name(image));
-        images.sort_by_key(|image| place_of(image).unwrap_or(usize::MAX));
+        images.sort_by_cached_key(|image| {
+            let name = name(image);
+            project.photos.iter().position(|known| *known == name).unwrap_or(usize::MAX)
+        });
         let given = options.images.first();
         let shown = given.and_then(|(path, _)| images.iter().position(|image| name(image) == relative(&folder, path)));
         let trial_pictures = trial_pictures(&project, &folder, &images, options, &mut gone)?;
-        let mut notes = std::mem::take(&mut gone.notes);
+        notes.append(&mut gone.notes);
         let temporary = match place {
             Some(_) => None,
             None => {
@@ -209,8 +221,8 @@ fn trial_pictures(
             continue;
         };
         let picture = Picture { name: tried.name.clone(), ..opened };
-        let is = |photo: &String, image: &MarkedPicture| relative(folder, &image.picture.path) == *photo;
-        let became = tried.became.as_ref().and_then(|photo| images.iter().position(|image| is(photo, image)));
+        let photo = tried.became.as_ref().map(|photo| folder.join(photo));
+        let became = photo.and_then(|photo| images.iter().position(|image| image.picture.is_at(&photo)));
         trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
     }
     let pictures = images.iter().map(|image| &image.picture).chain(trial_pictures.iter().map(|trial| &trial.picture));

@@ -1,8 +1,7 @@
 //! Pictures to try: adding, accepting as demonstrations, declaring them to be without the part, comparing.
 
-use std::path::Path;
-
 use sdg_demonstration::ModelKind;
+use sdg_files::absolute;
 use serde::Deserialize;
 
 use super::{MAX_LABEL_CHARS, Session};
@@ -214,8 +213,8 @@ impl Session {
         let is_copied = copy.is_some();
         let mut picture = copy.unwrap_or(trial.picture);
         picture.check_is_markable()?;
-        let folder_of = |path: &Path| std::path::absolute(path).ok()?.parent().map(Path::to_owned);
-        if !is_copied && (trial.uploaded || folder_of(&picture.path) != folder_of(&self.home)) {
+        let is_elsewhere = || absolute(&picture.path).parent() != absolute(&self.home).parent();
+        if !is_copied && (trial.uploaded || is_elsewhere()) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
@@ -223,7 +222,7 @@ impl Session {
             picture.name = file_name(&target);
             picture.path = target;
         }
-        self.lock_marks(&state, &picture.path)?;
+        self.lock_marks(&mut state, &picture.path)?;
         let id = state.add_image(picture, marks)?;
         state.trial_pictures[trial_id].became = Some(id);
         state.trial_pictures[trial_id].is_absent = false;

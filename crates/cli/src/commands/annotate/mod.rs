@@ -21,14 +21,16 @@ use crate::shared_args::TaughtCameraArgs;
 pub struct AnnotateArgs {
     /// Photos of one part (PNG, JPEG, WebP, BMP, TIFF). Marks are read from the file beside the photo as by sdg teach,
     /// or from ANNOTATION, and written to the file of the photo's name with .json, or to ANNOTATION; files of other
-    /// tools are read and never changed. With --from, an IMAGE that does not exist yet names the photo to be taken.
+    /// tools are read and never changed. The project records ANNOTATION: as long as it exists, the marks are read from
+    /// it when the photo is opened without it. With --from, an IMAGE that does not exist yet names the photo to be
+    /// taken.
     ///
     /// A photo is reopened in its last state, with its versions of the model, corrections and tried pictures, as
     /// recorded in IMAGE.sdg-project.json beside it; other files of its folder are ignored.
     ///
     /// Instead, DIR: one folder with a project in it (sdg-project.json). In a new project, pictures with marks beside
-    /// them are photos of the part and other pictures are pictures to try; if no picture has marks, the page asks which
-    /// picture is the photo.
+    /// them (in a text file: with a grasp) are photos of the part and other pictures are pictures to try; if no picture
+    /// has marks, the page asks which picture is the photo.
     ///
     /// Without IMAGE, DIR and --from, the page lists recent projects, and creates a new one in the current folder from
     /// a photo dropped on it
