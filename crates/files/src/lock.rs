@@ -49,8 +49,14 @@ fn try_lock(file: File, access: Access) -> (File, bool) {
 }
 
 /// Errors of a folder in which no lock file can be made; too many open files are none of them.
-const NOT_WRITABLE: [ErrorKind; 4] =
-    [ErrorKind::NotFound, ErrorKind::PermissionDenied, ErrorKind::ReadOnlyFilesystem, ErrorKind::InvalidFilename];
+const NOT_WRITABLE: [ErrorKind; 6] = [
+    ErrorKind::NotFound,
+    ErrorKind::PermissionDenied,
+    ErrorKind::ReadOnlyFilesystem,
+    ErrorKind::InvalidFilename,
+    ErrorKind::StorageFull,
+    ErrorKind::QuotaExceeded,
+];
 
 /// An exclusive lock for writing a file. A hidden file beside it carries the lock and names the holder. The hidden file
 /// is removed at the end; if it remains, the next holder takes it over.
