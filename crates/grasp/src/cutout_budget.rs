@@ -5,6 +5,7 @@ use image::RgbImage;
 use sdg_demonstration::ImageLimits;
 
 use crate::error::{GraspError, Result};
+use crate::prepared::MAX_EXTENT_PX;
 use crate::taught::MARGIN_PX;
 use crate::taught_marks::{TaughtMarks, extent};
 
@@ -23,16 +24,22 @@ pub(crate) fn check_count(count: usize) -> Result<()> {
     }
 }
 
+/// Maximum number of pixels of all cut-outs after they were resized for the search, which takes 0.2 s per million. A
+/// cut-out whose outline fills it has below 0.1 million.
+const MAX_RESIZED_PIXELS: f64 = 2e7;
+
 /// The number of pixels that the remaining cut-outs of a model may have. All cut-outs together may have as many pixels
 /// as one picture.
 #[derive(Debug)]
 pub(crate) struct CutoutBudget {
     pixels: u64,
+    /// After the cut-outs were resized for the search.
+    resized: f64,
 }
 
 impl Default for CutoutBudget {
     fn default() -> Self {
-        Self { pixels: ImageLimits::default().max_pixels }
+        Self { pixels: ImageLimits::default().max_pixels, resized: MAX_RESIZED_PIXELS }
     }
 }
 
@@ -48,13 +55,51 @@ impl CutoutBudget {
         ImageLimits { max_pixels: pixels.min(self.pixels) }
     }
 
-    /// Subtracts a cut-out.
-    pub(crate) fn take(&mut self, cutout: &RgbImage) -> Result<()> {
+    /// Subtracts a cut-out with these marks.
+    pub(crate) fn take(&mut self, cutout: &RgbImage, marks: &TaughtMarks) -> Result<()> {
         let pixels = u64::from(cutout.width()) * u64::from(cutout.height());
         self.pixels = self
             .pixels
             .checked_sub(pixels)
             .ok_or(GraspError::PartsTooLarge { most: ImageLimits::default().max_pixels / 1_000_000 })?;
-        Ok(())
+        let outline = marks.region().bounds();
+        let shrink = (MAX_EXTENT_PX / outline.width().max(outline.height())).min(1.0);
+        self.resized -= pixels as f64 * shrink * shrink;
+        // Not a number, for an outline without extent, is refused later.
+        if self.resized < 0.0 { Err(GraspError::MarksFarApart) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
+
+    use super::*;
+
+    #[test]
+    fn large_cut_outs_around_small_outlines_are_refused() {
+        let side = 1500;
+        let bbox = BoundingBox { x1: 0.0, y1: 0.0, x2: f64::from(side), y2: f64::from(side) };
+        let marks = |outline_px: f64| TaughtMarks {
+            label: "bar".to_owned(),
+            bbox,
+            grasp: GraspLine::new(Point2::new(40.0, 35.0), Point2::new(80.0, 35.0)),
+            outline: Some(Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: outline_px, y2: 30.0 })),
+            width_px: 30.0,
+            photo_size: None,
+            photo_middle: None,
+        };
+        let cutout = RgbImage::new(side, side);
+        let mut budget = CutoutBudget::default();
+        for _ in 0..8 {
+            budget.take(&cutout, &marks(80.0)).unwrap();
+        }
+        assert!(matches!(budget.take(&cutout, &marks(80.0)), Err(GraspError::MarksFarApart)));
+        // Around a large outline, the cut-out is reduced before it is searched.
+        let mut budget = CutoutBudget::default();
+        for _ in 0..80 {
+            budget.take(&cutout, &marks(1400.0)).unwrap();
+        }
     }
 }

@@ -95,6 +95,11 @@ pub enum GraspError {
         /// In millions of pixels.
         most: u64,
     },
+    /// Outlines that are much smaller than boxes and grasps.
+    #[error(
+        "expected outlines about as large as the marked boxes and grasps, found much smaller ones: correct the marks"
+    )]
+    MarksFarApart,
     /// Demonstrations of different parts.
     #[error("expected demonstrations of one part: {expected}; found {found}")]
     ContradictingDemonstrations {

@@ -143,7 +143,7 @@ impl GraspModel {
                 let png = tensor(&file, &format!("demonstrations.{i}.cutout"), Dtype::U8)?;
                 let limits = budget.limits(&marks);
                 let cutout = decode_image(png.data(), &limits).map_err(|error| not_a_cutout(error, &limits))?;
-                budget.take(&cutout)?;
+                budget.take(&cutout, &marks)?;
                 let mut check = CheckConfig::DEFAULT;
                 if let Some([low, high]) = facts.size_tolerance {
                     check.search.scales = low..=high;

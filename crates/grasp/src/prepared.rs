@@ -23,7 +23,7 @@ use crate::taught_marks::{TaughtMarks, whole_size};
 
 /// Maximum extent of a part at the working resolution, in pixels. Chosen to save time: the resulting error is at most a
 /// fraction of a pixel.
-const MAX_EXTENT_PX: f64 = 256.0;
+pub(crate) const MAX_EXTENT_PX: f64 = 256.0;
 /// Largest enlargement of a cut-out; a picture that would need more is halved instead. Chosen by hand, not measured.
 const MAX_ENLARGEMENT: f64 = 1.19;
 /// A cut-out is not resized if its size would change by less than this ratio. Chosen by hand, not measured.

@@ -198,7 +198,7 @@ fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Ve
     let mut budget = CutoutBudget::default();
     let with_tolerance = |demonstration| {
         let taught = TaughtDemonstration::new(demonstration)?;
-        budget.take(&taught.cutout)?;
+        budget.take(&taught.cutout, &taught.marks)?;
         let mut check = taught.check().clone();
         check.search.scales = options.size_tolerance.clone();
         if check == *taught.check() { Ok(taught) } else { taught.with_check(check) }
