@@ -24,7 +24,7 @@ pub(crate) fn check_count(count: usize) -> Result<()> {
     }
 }
 
-/// Maximum number of pixels of all cut-outs after they were resized for the search, which takes 0.2 s per million. A
+/// Maximum number of pixels of all cut-outs after they were resized for the search, which takes about 0.2 s per million. A
 /// cut-out whose outline fills it has below 0.1 million.
 const MAX_RESIZED_PIXELS: f64 = 2e7;
 
@@ -65,7 +65,6 @@ impl CutoutBudget {
         let outline = marks.region().bounds();
         let shrink = (MAX_EXTENT_PX / outline.width().max(outline.height())).min(1.0);
         self.resized -= pixels as f64 * shrink * shrink;
-        // Not a number, for an outline without extent, is refused later.
         if self.resized < 0.0 { Err(GraspError::MarksFarApart) } else { Ok(()) }
     }
 }
