@@ -205,17 +205,12 @@ fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
 
 /// The losses and the validation by step.
 pub fn teaching(history: &History) -> Section {
-    let parts: [(&str, fn(&LossValues) -> f64); 4] = [
-        ("keypoints", |l| l.keypoint),
-        ("masks", |l| l.mask),
-        ("class and box", |l| l.cls + l.box_reg),
-        ("proposals", |l| l.rpn_cls + l.rpn_loc),
-    ];
+    let parts = |l: &LossValues| [l.keypoint, l.mask, l.cls + l.box_reg, l.rpn_cls + l.rpn_loc];
     let mut losses = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
         .caption("Each step, and its running mean.");
-    for (name, pick) in parts {
+    for (idx, name) in ["keypoints", "masks", "class and box", "proposals"].into_iter().enumerate() {
         let points: Vec<(f64, f64)> =
-            history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect();
+            history.steps.iter().map(|record| (record.step as f64, parts(&record.losses)[idx])).collect();
         // The loss of a head that the detector lacks is zero, which a logarithmic axis cannot show.
         if points.iter().any(|(_, loss)| *loss > 0.0) {
             losses = losses.series(Series::new(name, points).noisy());
