@@ -17,7 +17,7 @@ async function bytesOf(file) {
 
 async function ours() {
   const detector = new Detector();
-  await detector.open(await (await bytesOf("model.sdg")).arrayBuffer());
+  await detector.open(await bytesOf("model.sdg"));
   const picture = await (await bytesOf("picture.png")).blob();
   return (verify) => detector.look(picture, verify);
 }

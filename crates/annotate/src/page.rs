@@ -58,9 +58,13 @@ pub fn file(name: &str) -> Option<(&'static str, String)> {
     Some((media_type, if media_type == STYLE { without_spaces(&text) } else { text }))
 }
 
-/// CSS without the spaces that it does not need; strings of the page's CSS contain none of these.
+/// CSS without the spaces and line ends that it does not need; strings of the page's CSS contain none of these.
 fn without_spaces(css: &str) -> String {
-    css.replace("; }", "}").replace(" { ", "{").replace("; ", ";").replace(": ", ":")
+    let mut css = css.replace("; }", "}").replace(" { ", "{").replace("; ", ";").replace(": ", ":");
+    for end in ["{", "}", ";", ","] {
+        css = css.replace(&format!("{end}\n"), end);
+    }
+    css
 }
 
 /// A file without indentation and comment lines.
@@ -97,7 +101,7 @@ mod tests {
     fn what_is_sent_has_all_lines_but_comments() {
         let text = "// About.\n  /** Two\n   * lines. */\nconst a = 1; // kept\n    b(`//`);\n<!-- no -->\n";
         assert_eq!(lean(text), "\n\n\nconst a = 1; // kept\nb(`//`);\n\n");
-        assert_eq!(without_spaces("a b { c: d; e: f; }\n"), "a b{c:d;e:f}\n");
+        assert_eq!(without_spaces("a,\nb c { d: e; f: g; }\n"), "a,b c{d:e;f:g}");
         for text in FILES.iter().map(|&(.., text)| text).chain([INDEX]) {
             assert_eq!(lean(text).lines().count(), text.lines().count());
             // A template literal over several lines, or code after the end of a comment, would be changed.

@@ -70,8 +70,7 @@ impl WriterLock {
     /// Takes the lock for a file that will be written; `None` if the folder is not writable.
     ///
     /// # Errors
-    /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if too many files are open or the
-    /// holder's name cannot be written.
+    /// [`FileError::Held`] if another process holds the lock, [`FileError::System`] if too many files are open.
     pub fn take(written: &Path) -> Result<Option<Self>> {
         let path = lock_file_of(written);
         loop {
@@ -90,11 +89,11 @@ impl WriterLock {
             }
             // The previous holder may have removed the file after it was opened here.
             if is_at(&file, &path) {
-                let named = file
+                // The lock also holds on a full disk, where it cannot name its holder.
+                let _ = file
                     .set_len(0)
                     .and_then(|()| file.rewind())
                     .and_then(|()| writeln!(file, "process {}", std::process::id()));
-                named.map_err(FileError::at(&path, "write"))?;
                 return Ok(Some(Self { path, _lock: Lock(file) }));
             }
         }

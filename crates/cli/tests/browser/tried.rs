@@ -255,7 +255,7 @@ fn a_search_without_an_answer_is_repeated_and_one_that_fails_is_not_waited_for()
     add(&page, &["a.png", "b.png"].map(|name| (name.to_owned(), photo())));
     patiently(&page, "the second picture", "return document.getElementById('strip').innerText.includes('1 found')");
     page.settle_frames();
-    assert_eq!(page.text("#found"), "too dark");
+    assert_eq!(page.text("#found"), "too dark\n\nRemove this picture");
     let count = page.text("#least-score-count");
     assert!(count.ends_with("in 1 of 1 pictures."), "{count}");
     assert_eq!(page.browser.run("return document.getElementById('looked').hidden", &[]).unwrap(), json!(true));

@@ -40,7 +40,7 @@ const CARD: &str = "webgpu";
 const LOOK: &str = "return (async (device, looks) => {
     const { Detector } = await import(new URL('./detector.js', location.href).href);
     const detector = new Detector(device);
-    await detector.open(await document.getElementById('model-file').chosen.arrayBuffer());
+    await detector.open(document.getElementById('model-file').chosen);
     const results = [];
     for (const file of document.getElementById('image-files').chosen) {
         results.push(await detector.look(file, true));

@@ -28,7 +28,7 @@ const ASK: &str = "return (async (requests) => {
     const { Detector } = await import(new URL('./detector.js', location.href).href);
     const detector = (window.detector ??= new Detector());
     const ask = {
-        open: (bytes) => detector.open(bytes.buffer),
+        open: (bytes) => detector.open(new Blob([bytes])),
         look: (bytes) => detector.look(new Blob([bytes]), true).then(({ record }) => record),
     };
     const late = new Promise((resolve) => setTimeout(() => resolve('no answer'), 5000));
