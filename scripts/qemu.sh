@@ -21,18 +21,37 @@ if [ ! -e "$qemu_kernel/done" ]; then
 fi
 qemu_release=$(ls "$qemu_kernel/lib/modules")
 
-# initramfs_root FOLDER MODULE…: an empty root with busybox and, in the order in which they are loaded, modules and what they need.
+# initramfs_root FOLDER MODULE…: an empty root with busybox, whose init loads these modules and those that they need, in this order, and
+# then does what this function reads from its standard input. A MODULE can be followed by its parameters ("vivid n_devs=1").
 initramfs_root() {
     rm -rf "$1"
     mkdir -p "$1"/{bin,dev,proc,sys,tmp,modules}
     cp /bin/busybox "$1/bin/"
-    local module
+    local module file parameters
     for module in "${@:2}"; do
-        modprobe -d "$qemu_kernel" -S "$qemu_release" --show-depends "$module" | sed -n 's/^insmod \([^ ]*\).*/\1/p'
-    done | awk '!seen[$0]++' | while read -r module; do
-        cp "$module" "$1/modules/"
-        basename "$module"
+        parameters=${module#"${module%% *}"}
+        modprobe -d "$qemu_kernel" -S "$qemu_release" --show-depends "${module%% *}" |
+            sed -n -e "\$ s/ *$/$parameters/" -e 's/^insmod //p'
+    done | awk '!seen[$1]++' | while read -r file parameters; do
+        cp "$file" "$1/modules/"
+        echo "$(basename "$file") $parameters"
     done >"$1/modules/order"
+    {
+        cat <<'INIT'
+#!/bin/busybox sh
+/bin/busybox --install -s /bin
+mount -t proc proc /proc
+mount -t sysfs sys /sys
+mount -t devtmpfs dev /dev
+cd /modules
+while read -r module parameters; do
+    insmod "$module" $parameters || echo "cannot load $module"
+done <order
+INIT
+        cat
+        echo "poweroff -f"
+    } >"$1/init"
+    chmod +x "$1/init"
 }
 
 # boot SECONDS FOLDER OPTION…: starts the kernel with this root, and prints the machine's output.

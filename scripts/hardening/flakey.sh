@@ -11,18 +11,8 @@ target=$(realpath "${CARGO_TARGET_DIR:-target}")
 work=$target/endurance
 mkdir -p "$work/flakey"
 root=$work/flakey/root
-initramfs_root "$root" virtio_pci virtio_blk ext4 dm-flakey 9p 9pnet_virtio
 truncate -s 128M "$work/flakey/disk"
-cat >"$root/init" <<INIT
-#!/bin/busybox sh
-/bin/busybox --install -s /bin
-mount -t proc proc /proc
-mount -t sysfs sys /sys
-mount -t devtmpfs dev /dev
-cd /modules
-while read -r module; do
-    insmod "\$module" || echo "cannot load \$module"
-done <order
+initramfs_root "$root" virtio_pci virtio_blk ext4 dm-flakey 9p 9pnet_virtio <<INIT
 mkdir /host
 mount -t 9p -o trans=virtio,version=9p2000.L,msize=524288,cache=loose,ro host /host
 mount -t 9p -o trans=virtio,version=9p2000.L,msize=524288 work "/host$work"
@@ -34,9 +24,7 @@ ip link set lo up
 chroot /host /bin/sh -c 'cd "$PWD" && PATH=/usr/sbin:/usr/bin:/sbin:/bin \
     "$target/release/endurance" --sdg "$target/release/sdg" crash --kills $1 --flakey /dev/vda ${*:2}'
 echo "endurance ended with \$?"
-poweroff -f
 INIT
-chmod +x "$root/init"
 
 # Not KVM, which is missing or broken in many virtual machines.
 boot "${FLAKEY_SECS:-36000}" "$root" -accel tcg -cpu max -m 4G -smp 2 -drive "file=$work/flakey/disk,if=virtio,format=raw" \

@@ -152,26 +152,30 @@ fn region_fit(image: &RgbImage, region: &Polygon, is_outline: bool) -> f64 {
 
 /// Change of colours across the border of a region, in grey values: larger if the border is the part's.
 fn border_contrast(image: &RgbImage, region: &Polygon, bounds: &BoundingBox) -> f64 {
-    let corners = &region.vertices;
     let reach = (0.01 * (bounds.width() + bounds.height())).max(2.0);
     let color = |at: Point2<f64>| {
         let inside = |value: f64, end: u32| (value.max(0.0) as u32).min(end - 1);
         image.get_pixel(inside(at.x, image.width()), inside(at.y, image.height())).0.map(f64::from)
     };
     let (mut sum, mut count) = (0.0, 0.0_f64);
-    let sides = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(start, end)| (start, end - start));
-    let step_px = (sides().map(|(_, side)| side.norm()).sum::<f64>() / MAX_BORDER_SAMPLES).max(1.0);
-    for (start, side) in sides() {
-        let across = Vector2::new(-side.y, side.x).try_normalize(f64::EPSILON).unwrap_or_default() * reach;
-        let num_steps = (side.norm() / step_px).ceil() as u32;
-        for step in 0..num_steps {
-            let at = start + side * (f64::from(step) / f64::from(num_steps));
-            let (one, other) = (color(at + across), color(at - across));
-            sum += (0..3).map(|channel| (one[channel] - other[channel]).abs()).sum::<f64>() / 3.0;
-            count += 1.0;
-        }
+    for (at, normal) in border_samples(&region.vertices) {
+        let across = normal * reach;
+        let (one, other) = (color(at + across), color(at - across));
+        sum += (0..3).map(|channel| (one[channel] - other[channel]).abs()).sum::<f64>() / 3.0;
+        count += 1.0;
     }
     sum / count.max(1.0)
+}
+
+/// Positions along a closed border, a pixel apart if these are not too many, and the border's unit normals there.
+fn border_samples(corners: &[Point2<f64>]) -> impl Iterator<Item = (Point2<f64>, Vector2<f64>)> {
+    let sides = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(start, end)| (start, end - start));
+    let step_px = (sides().map(|(_, side)| side.norm()).sum::<f64>() / MAX_BORDER_SAMPLES).max(1.0);
+    sides().flat_map(move |(start, side)| {
+        let normal = Vector2::new(-side.y, side.x).try_normalize(f64::EPSILON).unwrap_or_default();
+        let num_steps = (side.norm() / step_px).ceil() as u32;
+        (0..num_steps).map(move |step| (start + side * (f64::from(step) / f64::from(num_steps)), normal))
+    })
 }
 
 /// Difference between the colours inside a region and around it: 0 for the same colours in the same proportions, 2 for
@@ -234,6 +238,17 @@ mod tests {
             }
         }
         assert_eq!(other_reading(&photo(), &[]), None);
+    }
+
+    #[test]
+    fn a_border_has_a_sample_per_pixel_but_only_a_limited_number() {
+        let square = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 30.0, y2: 20.0 });
+        assert_eq!(border_samples(&square.vertices).count(), 100);
+        // 1,000 teeth of 4,000 pixels.
+        let comb: Vec<Point2<f64>> =
+            (0..1000).map(|idx| Point2::new(f64::from(idx), f64::from(idx % 2) * 4000.0)).collect();
+        let count = border_samples(&comb).count();
+        assert!((100_000..=101_000).contains(&count), "{count}");
     }
 
     #[test]

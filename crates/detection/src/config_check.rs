@@ -245,5 +245,10 @@ mod tests {
         );
         assert_eq!(field(|c| keypoint_head(c).conv_channels = vec![8; 33]), "roi_heads.keypoint_head.conv_channels");
         assert_eq!(field(|c| keypoint_head(c).num_keypoints = usize::MAX), "roi_heads.keypoint_head");
+        let long_mask_head = field(|c| {
+            *c = edge_of(RcnnKind::Mask { num_classes: 1 });
+            c.roi_heads.mask_head.as_mut().unwrap().conv_channels = vec![8; 33];
+        });
+        assert_eq!(long_mask_head, "roi_heads.mask_head.conv_channels");
     }
 }

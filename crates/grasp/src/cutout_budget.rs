@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn large_cut_outs_around_small_outlines_are_refused() {
+    fn cut_outs_that_are_large_before_or_after_resizing_are_refused() {
         let side = 1500;
         let bbox = BoundingBox { x1: 0.0, y1: 0.0, x2: f64::from(side), y2: f64::from(side) };
         let marks = |outline_px: f64| TaughtMarks {
@@ -97,8 +97,10 @@ mod tests {
         assert!(matches!(budget.take(&cutout, &marks(80.0)), Err(GraspError::MarksFarApart)));
         // Around a large outline, the cut-out is reduced before it is searched.
         let mut budget = CutoutBudget::default();
-        for _ in 0..80 {
+        for _ in 0..93 {
             budget.take(&cutout, &marks(1400.0)).unwrap();
         }
+        // 94 of 1500 × 1500 pixels are more than the 210 megapixels of one picture.
+        assert!(matches!(budget.take(&cutout, &marks(1400.0)), Err(GraspError::PartsTooLarge { most: 210 })));
     }
 }

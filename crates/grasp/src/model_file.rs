@@ -367,6 +367,7 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
 mod tests {
     use super::*;
     use crate::cutout_budget::MAX_DEMONSTRATIONS;
+    use crate::lengths::Lengths;
     use crate::network_calibration::NetworkCalibration;
     use crate::region::SearchRegion;
     use crate::score_calibration::ScoreCalibration;
@@ -496,6 +497,8 @@ mod tests {
         assert!(none.contains("a symmetry of 1 to 360 turns, found 0"), "{none}");
         let many = message(|model| model.facts.symmetry = RotationalSymmetry::Fold(361));
         assert!(many.contains("a symmetry of 1 to 360 turns, found 361"), "{many}");
+        let tiny = message(|model| model.facts.lengths = Some(Lengths::of_level_photos(0.0, 0.02, 0.01)));
+        assert!(tiny.contains("1 to 1000000 pixels per metre"), "{tiny}");
     }
 
     #[test]

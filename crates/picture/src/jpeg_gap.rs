@@ -157,6 +157,17 @@ mod tests {
     }
 
     #[test]
+    fn a_limited_number_of_stretches_is_tested() {
+        let mut damaged = jpeg(&RgbImage::from_fn(160, 120, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8])));
+        let [data] = &stretches(&damaged)[..] else { panic!("one scan") };
+        let middle = (data.start + data.end) / 2;
+        damaged[middle..middle + 200].fill(0);
+        let mut ends = Ends::of(&damaged, 3 * 160 * 120);
+        let accepted: Vec<bool> = (0..10).map(|_| ends.ends_with_its_blocks(data)).collect();
+        assert_eq!(accepted, [[false; 8].as_slice(), &[true; 2]].concat());
+    }
+
+    #[test]
     fn zeros_that_are_codes_are_read() {
         // Most of the 320 blocks have two bits: one for a difference of 0, one for the end of block. The second and the
         // last block have a difference of 1 and therefore four bits. All blocks together are 80.5 bytes.

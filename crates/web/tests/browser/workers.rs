@@ -54,7 +54,7 @@ fn every_request_is_answered_though_a_worker_stops_or_does_not_start() {
     let told = |requests: Value| browser.run(ASK, &[requests]).unwrap();
     let open = json!([["open", 1]]);
     assert_eq!(told(open.clone()), json!(["the worker could not be started"]));
-    // What could not be loaded is loaded with the next request.
+    // The next request loads it again.
     copy("worker.js");
     let missing = told(open.clone());
     assert!(missing[0].as_str().unwrap().contains("sdg_web.js"), "{missing}");
