@@ -15,6 +15,7 @@ use sdg_geometry::{Angle, RotationalSymmetry};
 use super::carry::{Aim, BELOW_M};
 use super::held_part::shape_of;
 use super::look::{HOVER_SHIFTS_M, OTHER_PART_M};
+use super::reach::{FINGERTIP_CLEARANCE_M, MAX_EARLY_M, above};
 use super::{GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{HandCommand, Load};
@@ -174,13 +175,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
-            self.put_down(&aim, placing)?;
+            let raised_m = self.put_down(&aim, goal, placing)?;
+            let base_from_placed = above(&aim.base_from_part, raised_m);
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.geometry().forward(&q);
             let shape = self.known.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
             let older = self.known.lying.clone();
-            let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
+            let lies = shape.map(|shape| LyingPart { base_from_part: base_from_placed, shape });
             lies.into_iter().for_each(|part| self.known.lying.put(part));
             let found = match (self.look_at(goal, &aim.base_from_part, &older, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
@@ -218,17 +220,20 @@ impl<A: Arm> Sequence<'_, '_, A> {
             // orientation.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
-            // The place's height is given, and the part's height above its surface was known before the first grasp.
-            target.base_from_tcp.translation.z = aim.base_from_part.translation.z;
-            self.known.surface_m = Some(goal.surface_m);
+            // The place's height is given or measured by the contact, and the part's height above its surface was known
+            // before the first grasp.
+            target.base_from_tcp.translation.z = base_from_placed.translation.z;
+            self.known.surface_m = Some(goal.surface_m + raised_m);
             // Other parts may lie next to the part: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
     }
 
-    /// Descends compliantly until contact with the place.
-    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
+    /// Descends compliantly until contact with the place; returns the height of the place above the given one, m. It is
+    /// 0 in a bin, where the part may lie on others, and if the contact is no farther from the expected one than the
+    /// finger tips remain from a surface: a part may be tilted in the hand.
+    fn put_down(&mut self, aim: &Aim, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<f64> {
         let touch_down = TouchDown { max_way_m: aim.soft_m + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
             let why =
@@ -237,16 +242,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         let hand = self.robot.hand()?;
         self.judge(GraspStep::PutDown, &hand)?;
-        if touched.is_contact {
-            return Ok(());
-        }
-        let below_mm = (aim.base_from_tcp.translation.z - aim.soft_m - touched.tcp_height_m) * 1e3;
-        let why = if below_mm <= -0.5 {
-            format!("a contact {:.0} mm above the place did not last; the part is still held", -below_mm)
-        } else {
-            format!("no contact was measured down to {below_mm:.0} mm below the place; the part is still held")
+        let above_m = touched.tcp_height_m - (aim.base_from_tcp.translation.z - aim.soft_m);
+        let [above_mm, max_mm] = [above_m, MAX_EARLY_M].map(|height_m| height_m * 1e3);
+        let why = match touched.is_contact {
+            true if goal.bin_m.is_some() || above_m.abs() <= FINGERTIP_CLEARANCE_M => return Ok(0.0),
+            true if above_m <= MAX_EARLY_M => return Ok(above_m),
+            true => format!("the contact was {above_mm:.0} mm above the place, at most {max_mm:.0} mm are allowed"),
+            false if above_mm >= 0.5 => format!("a contact {above_mm:.0} mm above the place did not last"),
+            false => format!("no contact was measured down to {:.0} mm below the place", -above_mm),
         };
-        Err(Stop::Failed(GraspStep::PutDown, why))
+        Err(Stop::Failed(GraspStep::PutDown, format!("{why}; the part is still held")))
     }
 
     /// Opens the hand and moves up; returns `part_from_tcp`, the tcp's pose in the part's frame according to the

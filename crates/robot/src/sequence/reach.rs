@@ -13,7 +13,7 @@ use crate::surroundings::{Destination, Way};
 use crate::touch::TouchDown;
 
 /// Minimum distance between finger tips and table when the hand closes, m.
-const FINGERTIP_CLEARANCE_M: f64 = 0.002;
+pub(super) const FINGERTIP_CLEARANCE_M: f64 = 0.002;
 /// Speed at which the opening changes during the descent, m/s.
 const OPENING_SPEED_M_S: f64 = 0.2;
 /// Time that the arm stands still before the hand closes, s.
@@ -24,8 +24,9 @@ const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
 const NARROW_MARGIN_M: f64 = 0.020;
 /// Length of a compliant descent, m.
 const SOFT_WAY_M: f64 = 0.020;
-/// Largest height above the grasp at which a compliant descent may end, m: the table's height is uncertain.
-const MAX_EARLY_M: f64 = 0.010;
+/// Largest height above the grasp, or above the expected contact of a held part with its place, at which a compliant
+/// descent may end, m: the surface's height is uncertain.
+pub(super) const MAX_EARLY_M: f64 = 0.010;
 
 /// A path to above a grasp, with the straight descent to it.
 enum Reach {
