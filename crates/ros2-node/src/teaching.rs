@@ -32,7 +32,8 @@ pub struct TeachJob {
     pub is_used: bool,
 }
 
-/// Teaches as the command `teach` of the program that runs the node, and writes the model.
+/// Teaches as the command `teach` of the program that runs the node, and writes the model. An error also for a written
+/// model that fails on its held-out samples.
 pub type Teach = dyn Fn(&TeachJob) -> Result<()> + Send + Sync;
 
 impl TeachJob {
@@ -113,7 +114,8 @@ impl Teaching {
         Ok(Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None })
     }
 
-    /// The model file and the duration in seconds, or the reason why there is no model; `None` while teaching is in progress.
+    /// The model file and the duration in seconds, or the reason why there is no usable model; `None` while teaching is
+    /// in progress.
     pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
         if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             return None;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use sdg_grasp::{Device, TeachOptions};
 use sdg_inputs::TeachingFiles;
 use sdg_ros2_node::TeachJob;
@@ -11,7 +11,6 @@ use super::args::TeachTriggerArgs;
 use crate::commands::teach::teach_to_file;
 use crate::demonstrations::photo_and_marks;
 use crate::interrupt::Interrupt;
-use crate::paint::{Paint, Tone};
 use crate::shared_args::{TaughtCameraArgs, height_mm};
 
 /// The teaching of the Trigger service; `None` without its arguments.
@@ -40,7 +39,8 @@ fn options(job: &TeachJob, device: &Device) -> Result<TeachOptions> {
 /// Teaches a model and writes it; `device` and `camera` are the node's device and its camera file.
 ///
 /// # Errors
-/// The errors of `sdg teach`; or a height of marks is given without a camera.
+/// The errors of `sdg teach`; a height of marks is given without a camera; or the written model fails on its held-out
+/// samples.
 pub(super) fn teach(job: &TeachJob, device: &Device, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
     let demonstration = match &job.marks {
         Some(marks) => (job.photo.clone().into(), marks.clone()),
@@ -64,18 +64,32 @@ pub(super) fn teach(job: &TeachJob, device: &Device, camera: Option<&Path>, inte
     sdg_files::check_extendable(&job.out, own)?;
     sdg_inputs::check_replaces_a_model(&job.out)?;
     let (_, figures) = teach_to_file(&demonstrations, &options, (&job.out, own), interrupt)?;
-    if let Some(failure) = figures.failure() {
-        eprintln!("{} {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
+    check_figures(&job.out, figures.failure())
+}
+
+/// Refuses a written model that fails on its held-out samples, so that the node does not use it.
+fn check_figures(out: &Path, failure: Option<String>) -> Result<()> {
+    match failure {
+        Some(failure) => bail!("{} was taught, but {failure}", out.display()),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_that_fails_on_its_samples_is_no_success() {
+        let out = Path::new("part.sdg");
+        check_figures(out, None).unwrap();
+        let error = check_figures(out, Some("the model fails".to_owned())).unwrap_err().to_string();
+        assert_eq!(error, "part.sdg was taught, but the model fails");
+    }
+
     #[cfg(feature = "ndarray")]
     #[test]
     fn a_service_teaches_on_the_device_of_the_node() {
-        use super::*;
         use sdg_grasp::ComputeBackend;
 
         let args = TeachTriggerArgs {
