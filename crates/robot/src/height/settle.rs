@@ -44,7 +44,8 @@ pub struct SettledHeight {
     pub source: HeightSource,
 }
 
-/// The more certain of both heights; the measured one if both are equally certain.
+/// The more certain of both heights; the measured one if both are equally certain. Error texts have heights above the
+/// table, whose z is `table_height_m`.
 ///
 /// # Errors
 /// The reason, in one sentence: both heights are missing (`why_not` says why none was measured), or they differ by more
@@ -53,6 +54,7 @@ pub fn settle(
     told: Option<GivenHeight>,
     measured: Option<MeasuredHeight>,
     why_not: Option<&str>,
+    table_height_m: f64,
 ) -> Result<SettledHeight, String> {
     let by_told = |GivenHeight { height_m, sigma_m }| SettledHeight { height_m, sigma_m, source: HeightSource::Told };
     let by_measurement =
@@ -66,8 +68,8 @@ pub fn settle(
             return Err(format!("the height of the part was not measured, and none was given: {why}"));
         }
     };
-    let [apart_mm, given_mm, measured_mm] =
-        [(told.height_m - measured.height_m).abs(), told.height_m, measured.height_m].map(|length| length * 1e3);
+    let [given_mm, measured_mm] = [told.height_m, measured.height_m].map(|height_m| (height_m - table_height_m) * 1e3);
+    let apart_mm = (told.height_m - measured.height_m).abs() * 1e3;
     let max_mm = MAX_SIGMAS * told.sigma_m.hypot(measured.sigma_m) * 1e3;
     if apart_mm > max_mm {
         let [told_sigma_mm, measured_sigma_mm] = [told.sigma_m, measured.sigma_m].map(|sigma| sigma * 1e3);
@@ -93,7 +95,7 @@ mod tests {
 
     #[test]
     fn the_more_certain_of_both_is_used() {
-        let source = |told, measured| settle(told, measured, None).unwrap().source;
+        let source = |told, measured| settle(told, measured, None, 0.0).unwrap().source;
         assert_eq!(source(told(16.0, 0.3), measured(17.0, 0.8)), HeightSource::Told);
         assert_eq!(source(told(16.0, 2.0), measured(17.0, 0.8)), HeightSource::Measured);
         assert_eq!(source(told(16.0, 0.3), None), HeightSource::Told);
@@ -103,14 +105,18 @@ mod tests {
     #[test]
     fn heights_that_contradict_each_other_are_refused() {
         // 3 √(0.6² + 0.8²) = 3 mm.
-        assert!(settle(told(16.0, 0.6), measured(18.99, 0.8), None).is_ok());
-        let why = settle(told(16.0, 0.6), measured(19.01, 0.8), None).unwrap_err();
-        assert!(why.contains("given height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart"), "{why}");
+        assert!(settle(told(16.0, 0.6), measured(18.99, 0.8), None, 0.0).is_ok());
+        // The second table is 12.5 mm below the base.
+        for (table_mm, told_mm, measured_mm) in [(0.0, 16.0, 19.01), (-12.5, 3.5, 6.51)] {
+            let why = settle(told(told_mm, 0.6), measured(measured_mm, 0.8), None, 1e-3 * table_mm).unwrap_err();
+            let expected = "given height of 16.0 ± 0.6 mm, measured 19.0 ± 0.8 mm: at most 3.0 mm apart";
+            assert!(why.contains(expected), "{why}");
+        }
     }
 
     #[test]
     fn without_any_height_the_reason_is_told() {
-        let why = settle(None, None, Some("the second picture does not show the part")).unwrap_err();
+        let why = settle(None, None, Some("the second picture does not show the part"), 0.0).unwrap_err();
         assert!(why.ends_with("none was given: the second picture does not show the part"), "{why}");
     }
 }

@@ -91,6 +91,18 @@ pub enum HeightError {
     NotFinite,
 }
 
+impl HeightError {
+    /// The same error with heights above the table, whose z is `table_height_m`, instead of above the base.
+    pub(crate) fn above_table(self, table_height_m: f64) -> Self {
+        match self {
+            Self::BehindCamera { height_m, camera_m } => {
+                Self::BehindCamera { height_m: height_m - table_height_m, camera_m: camera_m - table_height_m }
+            }
+            error => error,
+        }
+    }
+}
+
 /// Height of the marks of a part from two pictures; `relief_m` is the standard deviation of the height of its visible
 /// edges.
 ///

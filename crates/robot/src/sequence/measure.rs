@@ -40,7 +40,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         report.measured = measured.as_ref().ok().map(|(height, _)| *height);
         report.why_not = measured.as_ref().err().cloned();
-        let settled = settle(measurement.told, report.measured, report.why_not.as_deref());
+        let table_height_m = self.robot.limits().table_height_m;
+        let settled = settle(measurement.told, report.measured, report.why_not.as_deref(), table_height_m);
         report.settled = settled.as_ref().ok().copied();
         let sightings = match measured {
             Ok((_, pair)) => pair.to_vec(),
@@ -133,7 +134,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                     }
                     // One picture across the line and one along it may be too close together.
                     Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
-                    Some(Err(error)) => why = Some(error.to_string()),
+                    Some(Err(error)) => why = Some(error.above_table(table_height_m).to_string()),
                     None => {}
                 }
             }

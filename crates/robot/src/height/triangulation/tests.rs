@@ -71,6 +71,8 @@ fn pictures_that_tell_no_height_are_refused() {
     let (mut one, mut other) = (at(0.44, 0.3), at(0.56, 0.3));
     (one.middle_m.x, other.middle_m.x) = (0.40, 0.60);
     assert!(refused(&one, &other).contains("found lines of sight that cross at"));
+    let behind = HeightError::BehindCamera { height_m: 0.30, camera_m: 0.30 }.above_table(-0.1).to_string();
+    assert!(behind.ends_with("which is 400 mm high, found lines of sight that cross at 400 mm"), "{behind}");
     // A plane too close below the camera.
     assert!(refused(&shown([0.44, 0.3], 0.5, 0.0, 0.29), &at(0.56, 0.3)).contains("below the camera"));
     // Two parts: the lines of sight pass each other 12 mm apart.
