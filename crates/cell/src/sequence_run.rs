@@ -11,7 +11,8 @@ pub struct Ended {
     pub grasp: GraspReport,
     /// The step that failed, and the reason; `None` if all steps succeeded.
     pub failed: Option<(GraspStep, String)>,
-    /// Offset of the placed part from its place, measured in the last picture; `None` without a place or a measurement.
+    /// Offset of the placed part from its place, measured in the last picture; `None` without a place or a measurement,
+    /// and if a repeated grasp began after that picture.
     pub beside: Option<PlaceOffset>,
     /// The results of the compliant descents of placing and of repeated grasps.
     pub touched: Vec<Touched>,
@@ -48,6 +49,5 @@ pub fn run_sequence<A: CompliantArm>(
         PlacingOutcome::Placed => None,
         PlacingOutcome::Failed { step, why } => Some((step, why)),
     };
-    let beside = report.errors.last().copied();
-    Ok(Ended { grasp: report.grasp, failed, beside, touched: report.touched })
+    Ok(Ended { grasp: report.grasp, failed, beside: report.last, touched: report.touched })
 }

@@ -99,6 +99,9 @@ pub struct PlacingReport {
     pub touched: Vec<Touched>,
     /// The part's offset from its place (from a bin's centre), one for each picture in which the part was detected.
     pub errors: Vec<PlaceOffset>,
+    /// The part's offset in the last picture of its place; `None` if it was not detected there, or if a repeated grasp
+    /// began after that picture.
+    pub last: Option<PlaceOffset>,
 }
 
 /// Grasps the part and puts it down; repeats both if the part's offset is too large, see
@@ -125,16 +128,17 @@ pub fn grasp_and_place<A: CompliantArm>(
     let mut sequence = Sequence::yielding(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
-    let mut errors = Vec::new();
+    let (mut errors, mut last) = (Vec::new(), None);
     let outcome = match &grasp.outcome {
         GraspOutcome::Failed { step, why } => PlacingOutcome::Failed { step: *step, why: why.clone() },
-        GraspOutcome::Held => match sequence.place(goal, placing, &mut errors) {
+        GraspOutcome::Held => match sequence.place(goal, placing, &mut errors, &mut last) {
             Ok(()) => PlacingOutcome::Placed,
             Err(Stop::Failed(step, why)) => PlacingOutcome::Failed { step, why },
             Err(Stop::Error(error)) => return Err(error),
         },
     };
-    Ok(PlacingReport { grasp, outcome, touched: std::mem::take(&mut sequence.report.touched), errors })
+    let touched = std::mem::take(&mut sequence.report.touched);
+    Ok(PlacingReport { grasp, outcome, touched, errors, last })
 }
 
 impl PlacingOutcome {
@@ -171,7 +175,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(())
     }
 
-    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceOffset>) -> Steps<()> {
+    /// Fills the last two fields of the report, `errors` and `last`.
+    fn place(
+        &mut self,
+        goal: &PlaceGoal,
+        placing: &PlacingConfig,
+        errors: &mut Vec<PlaceOffset>,
+        last: &mut Option<PlaceOffset>,
+    ) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
@@ -192,6 +203,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             };
             let error = beside(&aim.base_from_part, &found.base_from_tcp, placing.symmetry);
             errors.push(error);
+            *last = Some(error);
             if let Some(outside_m) = outside_bin_m(goal, &found) {
                 return match outside_m > 0.0 {
                     true => Err(fails(format!("the part lies beside the bin, {} from its centre", told(&error)))),
@@ -214,6 +226,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
+            *last = None;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // The hand keeps the orientation in which it released the part, because the fingers had room in that

@@ -356,6 +356,7 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert_eq!(report.errors.len(), 2);
     assert!(report.errors[0].distance_m() > 0.004 && report.errors[1].distance_m() < 2e-4, "{report:?}");
+    assert_eq!(report.last, Some(report.errors[1]));
     // Without a second grasp the part lies beside its place, which is reported.
     let mut once = super::tests::cell(slide);
     let never = PlacingConfig { max_corrections: 0, ..PlacingConfig::default() };
@@ -364,6 +365,30 @@ fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
         panic!("{:?}", once.base_from_part)
     };
     assert!(why.contains("5.1 mm and 4.6° beside its place, at most 3.0 mm and 3.0°"), "{why}");
+}
+
+/// Finds the part at its place only in the first of the pictures.
+struct SeenOnce(bool);
+
+impl PartFinder<Cell> for SeenOnce {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, cell: &mut Cell, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        if std::mem::replace(&mut self.0, true) { Ok(None) } else { Truth.find(cell) }
+    }
+}
+
+#[test]
+fn an_offset_before_a_failed_correction_is_not_the_last_one() {
+    let mut cell = cell(planar(0.005, 0.001, 0.08));
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let (config, goal, placing) = (config(), tray().goal(2).unwrap(), PlacingConfig::default());
+    let report = grasp_and_place(&mut robot, &mut SeenOnce(false), &mut (), camera, &config, &goal, &placing).unwrap();
+    assert!(matches!(report.outcome, PlacingOutcome::Failed { step: GraspStep::Check, .. }), "{report:?}");
+    assert!(report.errors.len() == 1 && report.last.is_none(), "{report:?}");
 }
 
 #[test]
