@@ -195,7 +195,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let older = self.known.lying.clone();
             let lies = shape.map(|shape| LyingPart { base_from_part: base_from_placed, shape });
             lies.into_iter().for_each(|part| self.known.lying.put(part));
-            let found = match (self.look_at(goal, &aim.base_from_part, &older, placing)?, goal.bin_m) {
+            let found = match (self.look_at(goal, &base_from_placed, &older, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part may lie in any pose, also under other parts.
                 (None, Some(_)) => return Ok(()),

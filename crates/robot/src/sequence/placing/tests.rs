@@ -404,6 +404,34 @@ fn a_part_that_slides_is_taken_again_from_a_raised_place_at_its_measured_height(
     }
 }
 
+/// Finds the part; records the height (m) at which it was searched in its place.
+struct SearchedAt(f64);
+
+impl PartFinder<Cell> for SearchedAt {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Truth.find(cell)
+    }
+
+    fn find_nearest(&mut self, cell: &mut Cell, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        self.0 = base_from_tcp.translation.z;
+        Truth.find(cell)
+    }
+}
+
+#[test]
+fn a_part_is_searched_at_the_measured_height_of_its_place() {
+    let camera = CameraPose::InBase(Isometry3::identity());
+    let (config, goal, placing) = (config(), tray().goal(1).unwrap(), PlacingConfig::default());
+    // A contact within 2 mm of the expected one counts as that.
+    for (lower_m, expected_m) in [(0.001, 0.02), (0.006, 0.014)] {
+        let mut cell = Cell { lower_m, ..cell(Isometry3::identity()) };
+        let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+        let mut finder = SearchedAt(f64::NAN);
+        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &config, &goal, &placing).unwrap();
+        assert!((finder.0 - expected_m).abs() < 1e-4, "{}", finder.0);
+    }
+}
+
 #[test]
 fn a_part_that_touches_an_object_above_its_place_is_kept() {
     let mut onto = Cell { lower_m: -0.012, ..cell(Isometry3::identity()) };
