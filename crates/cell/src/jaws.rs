@@ -13,7 +13,7 @@
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarGrasp, Polygon};
-use sdg_grasp::GraspDetection;
+use sdg_grasp::{GraspDetection, TaughtDemonstration};
 use sdg_kinematics::{FINGER_HALF_WIDTH_M, finger_thickness_m};
 
 use crate::perception::Perception;
@@ -97,16 +97,23 @@ impl Perception {
 
     /// Length of the marked line on a detected part, in pixels. A detection has only the line's midpoint.
     pub fn marked_length(&self, detection: &GraspDetection) -> f64 {
-        let taught = &self.model().demonstrations()[0].marks;
-        let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
-        taught.grasp.length() * scale
+        marked_length(self.model().demonstrations(), detection)
     }
+}
+
+/// As [`Perception::marked_length`], for a model's demonstrations, whose lines may have different lengths.
+fn marked_length(demonstrations: &[TaughtDemonstration], detection: &GraspDetection) -> f64 {
+    let taught = &demonstrations[detection.demonstration_idx].marks;
+    let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
+    taught.grasp.length() * scale
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use sdg_geometry::{Angle, BoundingBox};
+    use sdg_grasp::{GraspModel, TeachOptions, TurnSource};
+    use std::path::Path;
 
     /// Jaws of 22 x 15 pixels that close on a part of 20 pixels, from above and from below at an angle of zero.
     fn touches(angle_deg: f64, part: [f64; 4]) -> bool {
@@ -126,6 +133,37 @@ mod tests {
         assert!(!touches(0.0, [60.0, 92.0, 140.0, 108.0]));
         // A neighbour that is smaller than a jaw, completely below it.
         assert!(touches(0.0, [98.0, 114.0, 104.0, 119.0]));
+    }
+
+    #[test]
+    fn the_marked_line_is_that_of_the_found_demonstration() {
+        let path = "../../datasets/models/pendulum-shape-format-3.sdg";
+        let bytes = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
+        let model = GraspModel::from_bytes(&bytes, &TeachOptions::new(0).device).unwrap();
+        let first = model.demonstrations()[0].clone();
+        // The photo from half the distance, with a line of the same length in pixels.
+        let mut marks = first.marks.clone();
+        marks.width_px *= 2.0;
+        let second = TaughtDemonstration::from_parts(first.cutout.clone(), marks).unwrap();
+        let detection = |demonstration_idx: usize| GraspDetection {
+            demonstration_idx,
+            score: 0.9,
+            network_score: 0.0,
+            agreement: None,
+            evidence: None,
+            bbox: BoundingBox { x1: 0.0, y1: 0.0, x2: 50.0, y2: 50.0 },
+            keypoints: Vec::new(),
+            outline: None,
+            grasp: PlanarGrasp { x: 25.0, y: 25.0, angle: Angle::from_degrees(0.0), width: first.marks.width_px },
+            turn_source: TurnSource::Keypoints,
+            light: 1.0,
+        };
+        let taught = [first.clone(), second];
+        let length_px = first.marks.grasp.length();
+        for (demonstration_idx, expected_px) in [(0, length_px), (1, 0.5 * length_px)] {
+            let found_px = marked_length(&taught, &detection(demonstration_idx));
+            assert!((found_px - expected_px).abs() < 1e-9, "{found_px} instead of {expected_px}");
+        }
     }
 
     #[test]
