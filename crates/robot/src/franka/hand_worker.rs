@@ -23,10 +23,23 @@ impl HandWorker {
 
     /// Waits for a running motion, then starts another.
     pub(super) fn start(&mut self, command: HandCommand) -> Result<()> {
+        self.spawn(move |hand| execute(hand, command))
+    }
+
+    /// As [`Self::start`], for the motion that finds the fingers' range.
+    pub(super) fn start_homing(&mut self) -> Result<()> {
+        self.spawn(|hand| match hand.homing() {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(RobotError::Hand("it did not find its range".to_owned())),
+            Err(error) => Err(RobotError::Hand(error.to_string())),
+        })
+    }
+
+    fn spawn(&mut self, motion: impl FnOnce(&mut Hand) -> Result<()> + Send + 'static) -> Result<()> {
         self.finish()?;
         let mut hand = self.hand.take().ok_or_else(gone)?;
         self.running = Some(std::thread::spawn(move || {
-            let done = execute(&mut hand, command);
+            let done = motion(&mut hand);
             (hand, done)
         }));
         Ok(())
@@ -61,15 +74,6 @@ impl HandWorker {
         self.finish()?;
         let state = self.hand.as_mut().ok_or_else(gone)?.read_state().map_err(|error| address.lost("hand", &error))?;
         Ok(HandState { opening_m: state.width, is_grasping: state.is_grasped, force_n: None })
-    }
-
-    pub(super) fn home(&mut self) -> Result<()> {
-        self.finish()?;
-        match self.hand.as_mut().ok_or_else(gone)?.homing() {
-            Ok(true) => Ok(()),
-            Ok(false) => Err(RobotError::Hand("it did not find its range".to_owned())),
-            Err(error) => Err(RobotError::Hand(error.to_string())),
-        }
     }
 }
 

@@ -94,13 +94,14 @@ impl FrankaArm {
         })
     }
 
-    /// Finds the fingers' range; needed once after the hand was switched on.
+    /// Finds the fingers' range; needed once after the hand was switched on. `watch` may stop the fingers.
     ///
     /// # Errors
-    /// [`RobotError::Hand`], and as for [`Arm::start_hand`] after a stop of the arm.
-    pub fn home_hand(&mut self) -> Result<()> {
+    /// [`RobotError::Hand`], and as for [`Arm::start_hand`] and [`Arm::finish_hand`].
+    pub fn home_hand(&mut self, watch: &mut Watch) -> Result<()> {
         self.check_hand_may_move()?;
-        self.hand.home()
+        self.hand.start_homing()?;
+        self.finish_hand(watch).map(drop)
     }
 
     /// Fails after a stop of the arm. The hand alone would move, and release a held part.

@@ -44,9 +44,15 @@ pub struct HomeArgs {
 
 pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     if args.hand {
+        check_states(&args.states)?;
         let (mut arm, address) = args.arm.connect()?;
         if confirm(&format!("Move the fingers of the hand at {address}?"), args.yes)? == Consent::Given {
-            arm.home_hand()?;
+            let mut watch = robots::watch(&Interrupt::watch());
+            let homed = arm.home_hand(&mut watch);
+            if homed.is_err() {
+                write_states(&args.states, &watch);
+            }
+            homed?;
             // The hand no longer holds an object.
             arm.set_load(Load::NONE)?;
         }

@@ -169,3 +169,17 @@ fn every_schedule_reports_each_motion_once_and_stops_only_a_moving_hand() {
     assert_eq!(num_schedules, 3905);
     assert!(checked.hand.requests.try_recv().is_err());
 }
+
+#[test]
+fn a_stop_ends_the_search_for_the_range_of_the_fingers() {
+    let (mut worker, mut hand) = DrivenHand::connected();
+    worker.start_homing().unwrap();
+    let (id, request) = hand.request();
+    assert_eq!(request, HandRequest::Homing);
+    worker.stop_motion();
+    let (stop, request) = hand.request();
+    assert_eq!(request, HandRequest::Stop);
+    hand.respond(HandStatus::Aborted, Command::Homing, id);
+    hand.respond(HandStatus::Success, Command::Stop, stop);
+    assert!(worker.finish().is_err());
+}
