@@ -36,7 +36,7 @@ const ANSWER: Duration = Duration::from_secs(5);
 const MAX_DELAY_SECS: f64 = 5.0;
 /// Timeout of a hand motion.
 const MAX_HAND: Duration = Duration::from_secs(15);
-/// Time without joint states after which the driver counts as disconnected.
+/// Time without joint states, or with the same stamp in all of them, after which the driver counts as disconnected.
 const MAX_STATE_AGE: Duration = Duration::from_millis(500);
 /// Largest gap between two states of a moving arm, s: drivers publish 20 to 1000 states per second, and networks delay
 /// them.
@@ -114,7 +114,8 @@ impl TrajectoryArm {
         let age = known.arrived.elapsed();
         if age > MAX_STATE_AGE {
             let topic = &self.states.topic;
-            return Err(self.lost(format!("no joint states on {topic} for {:.1} s", age.as_secs_f64())));
+            let secs = age.as_secs_f64();
+            return Err(self.lost(format!("no joint states on {topic} with a new stamp for {secs:.1} s")));
         }
         Ok(known)
     }

@@ -57,6 +57,8 @@ pub(super) struct Known {
     pub(super) opening_m: Option<f64>,
     /// Stamp of the message, s.
     pub(super) stamp_secs: f64,
+    /// Arrival of the first message with this stamp. The checks of a motion compare stamps: a source whose stamp is
+    /// constant counts as one that sends no states.
     pub(super) arrived: Instant,
 }
 
@@ -112,12 +114,14 @@ fn merged(before: Option<Known>, message: &JointState, arrived: Instant, config:
     match positions {
         Some(positions) => {
             let velocity = |joint: &String| value(&message.velocity, joint).unwrap_or(0.0);
+            let stamp_secs = message.header.stamp.secs();
+            let same = before.filter(|before| before.stamp_secs == stamp_secs);
             Some(Known {
                 q: Joints::from_iterator(positions),
                 dq: Joints::from_iterator(config.joints.iter().map(velocity)),
                 opening_m: opening_m.or(before.and_then(|before| before.opening_m)),
-                stamp_secs: message.header.stamp.secs(),
-                arrived,
+                stamp_secs,
+                arrived: same.map_or(arrived, |same| same.arrived),
             })
         }
         None => Some(Known { opening_m: Some(opening_m?), ..before? }),
@@ -146,5 +150,18 @@ mod tests {
         assert_eq!((both.q[0], both.opening_m), (1.0, Some(0.05)));
         assert!(merged(None, &states(&names[1..], &[0.0; 6]), now, &config).is_none());
         assert!(merged(None, &states(&names, &[0.0; 3]), now, &config).is_none());
+    }
+
+    #[test]
+    fn states_whose_stamp_does_not_advance_become_old() {
+        let config = ArmConfig::default();
+        let names: Vec<&str> = config.joints.iter().map(String::as_str).collect();
+        let mut message = states(&names, &[0.0; 7]);
+        let first = Instant::now();
+        let later = first + Duration::from_secs(1);
+        let known = merged(None, &message, first, &config);
+        assert_eq!(merged(known, &message, later, &config).unwrap().arrived, first);
+        message.header.stamp.nanosec = 1;
+        assert_eq!(merged(known, &message, later, &config).unwrap().arrived, later);
     }
 }
