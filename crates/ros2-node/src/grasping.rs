@@ -18,6 +18,7 @@ use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time}
 
 use crate::camera_pose::CameraPoseReader;
 use crate::pictures::Shared;
+use crate::requests::given;
 use crate::settings::IsInterrupted;
 
 /// Maximum wait for a picture taken after the arm has stopped.
@@ -107,8 +108,7 @@ impl Grasping {
         if let Some(why) = &self.latched {
             anyhow::bail!("nothing moves until a person has checked the arm and restarts the node: {why}");
         }
-        let speed = if request.speed > 0.0 { request.speed } else { self.settings.speed };
-        let pace = Pace::at_speed(speed)?;
+        let pace = Pace::at_speed(given("speed", request.speed)?.unwrap_or(self.settings.speed))?;
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }

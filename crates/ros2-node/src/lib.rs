@@ -20,6 +20,7 @@ mod grasping;
 mod lines;
 mod pictures;
 mod publishing;
+mod requests;
 mod searching;
 mod services;
 mod settings;

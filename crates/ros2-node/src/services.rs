@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use sdg_ros2::RosError;
 use sdg_ros2::cdr::Cdr;
 use sdg_ros2::dds::{Node, RequestId, Server, ServiceType};
@@ -18,6 +18,7 @@ use crate::camera_pose::CameraPoseReader;
 use crate::grasping::Grasping;
 use crate::lines::Lines;
 use crate::pictures::PictureReader;
+use crate::requests::given;
 use crate::searching::Searched;
 use crate::teaching::{Teach, TeachJob, Teaching};
 
@@ -173,16 +174,13 @@ impl Services {
 
     fn take_detections(&mut self) {
         for (asker, request) in self.detect.requests(&self.lines) {
-            let request = match request {
-                Ok(request) => request,
+            let checked = request.map_err(anyhow::Error::from).and_then(|request| Ok((timeout_of(&request)?, request)));
+            let (timeout, request) = match checked {
+                Ok(checked) => checked,
                 Err(error) => {
                     self.answer_detection(asker, Err(error.to_string()));
                     continue;
                 }
-            };
-            let timeout = match request.timeout_secs {
-                secs if secs > 0.0 => Duration::from_secs_f64(secs.min(MAX_DETECT_TIMEOUT_SECS)),
-                _ => DETECT_TIMEOUT,
             };
             let asked = Instant::now();
             self.detecting.push(Detecting { asker, request, wait: Wait { asked, deadline: asked + timeout } });
@@ -324,6 +322,20 @@ impl Services {
     }
 }
 
+/// The time in which a picture must arrive.
+///
+/// # Errors
+/// The request is invalid.
+fn timeout_of(request: &DetectRequest) -> Result<Duration> {
+    if let Some(min_score) = given("min_score", request.min_score)?
+        && min_score > 1.0
+    {
+        bail!("min_score: expected at most 1, found {min_score}");
+    }
+    let secs = given("timeout_secs", request.timeout_secs)?;
+    Ok(secs.map_or(DETECT_TIMEOUT, |secs| Duration::from_secs_f64(secs.min(MAX_DETECT_TIMEOUT_SECS))))
+}
+
 fn detect_response(request: &DetectRequest, searched: &Searched) -> DetectResponse {
     let min_score = if request.min_score > 0.0 { request.min_score } else { searched.min_score };
     let found: Vec<_> = searched.found.iter().filter(|part| part.score >= min_score).cloned().collect();
@@ -358,6 +370,20 @@ mod tests {
         {
             assert_eq!(wait.is_over(now, newest_arrival), is_over);
             assert!(!wait.is_over(in_time, newest_arrival));
+        }
+    }
+
+    #[test]
+    fn a_detection_with_invalid_numbers_is_refused() {
+        let checked = |min_score: f64, timeout_secs: f64| timeout_of(&DetectRequest { min_score, timeout_secs });
+        for (timeout_secs, expected_secs) in [(0.0, 5), (3.0, 3), (100.0, 60)] {
+            assert_eq!(checked(0.3, timeout_secs).unwrap(), Duration::from_secs(expected_secs));
+        }
+        for (min_score, timeout_secs, name) in
+            [(f64::NAN, 0.0, "min_score"), (1.1, 0.0, "min_score"), (0.0, -1.0, "timeout_secs")]
+        {
+            let error = checked(min_score, timeout_secs).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("{name}: expected")), "{error}");
         }
     }
 

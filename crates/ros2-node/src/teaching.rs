@@ -11,6 +11,8 @@ use sdg_inputs::one_line;
 use sdg_ros2::messages::TeachRequest;
 use tempfile::TempPath;
 
+use crate::requests::given;
+
 /// The inputs of a teaching run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeachJob {
@@ -47,6 +49,9 @@ impl TeachJob {
         if request.photo_path.is_empty() || request.out_path.is_empty() {
             bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);
         }
+        if !request.annotation.is_empty() && !request.annotation_path.is_empty() {
+            bail!("expected annotation or annotation_path, found both");
+        }
         let brought = match request.annotation.as_str() {
             "" => None,
             text => {
@@ -57,17 +62,15 @@ impl TeachJob {
             }
         };
         let named = || (!request.annotation_path.is_empty()).then(|| PathBuf::from(&request.annotation_path));
-        let (model, budget_secs) = (request.model.as_str(), request.time_budget_secs);
+        let (model, budget_secs) = (request.model.as_str(), given("time_budget_secs", request.time_budget_secs)?);
         let job = Self {
             photo: request.photo_path.clone(),
             marks: brought.as_ref().map(|file| file.to_path_buf()).or_else(named),
             out: PathBuf::from(&request.out_path),
             model: if model.is_empty() { Self::DEFAULT_MODEL } else { model }.to_owned(),
             seed: if request.seed == 0 { Self::DEFAULT_SEED } else { request.seed },
-            time_budget: (budget_secs > 0.0)
-                .then(|| Duration::try_from_secs_f64(budget_secs).context("time_budget_secs"))
-                .transpose()?,
-            mark_height_mm: Some(request.mark_height_mm).filter(|&height_mm| height_mm > 0.0),
+            time_budget: budget_secs.map(Duration::try_from_secs_f64).transpose().context("time_budget_secs")?,
+            mark_height_mm: given("mark_height_mm", request.mark_height_mm)?,
             is_used: request.use_it,
         };
         Ok((job, brought))
@@ -144,6 +147,24 @@ mod tests {
         drop(brought);
         assert!(!marks.exists());
         assert!(TeachJob::read(&TeachRequest { out_path: String::new(), ..request }).is_err());
+    }
+
+    #[test]
+    fn a_request_with_invalid_numbers_or_two_annotations_is_refused() {
+        let request = || TeachRequest {
+            photo_path: "part.png".to_owned(),
+            out_path: "part.sdg".to_owned(),
+            annotation: "{}".to_owned(),
+            ..TeachRequest::default()
+        };
+        for (refused, expected) in [
+            (TeachRequest { mark_height_mm: -5.0, ..request() }, "mark_height_mm: expected a number above 0"),
+            (TeachRequest { time_budget_secs: -1.0, ..request() }, "time_budget_secs: expected a number above 0"),
+            (TeachRequest { annotation_path: "part.json".to_owned(), ..request() }, "found both"),
+        ] {
+            let error = TeachJob::read(&refused).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]
