@@ -88,7 +88,7 @@ pub fn run(
                 Err(error) => {
                     let error = one_line(&error);
                     lines.complain(&error);
-                    topics.failed(picture.arrived);
+                    topics.failed();
                     services.searched(Err(error), picture.arrived);
                 }
             }

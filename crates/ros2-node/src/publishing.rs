@@ -34,7 +34,6 @@ pub(super) struct Topics {
     diagnostics: Publisher<DiagnosticArray>,
     name: String,
     last_diagnostics: Instant,
-    last_picture: Option<Instant>,
     num_searched: u64,
     num_failed: u64,
     last_search_secs: f64,
@@ -53,7 +52,6 @@ impl Topics {
             diagnostics: node.publish("/diagnostics", Qos::RESULTS)?,
             name: node.naming().node().to_owned(),
             last_diagnostics: Instant::now(),
-            last_picture: None,
             num_searched: 0,
             num_failed: 0,
             last_search_secs: 0.0,
@@ -79,7 +77,6 @@ impl Topics {
         self.told(self.detections.send(to_detections(header, &searched.found)));
         self.last_latency_secs = searched.arrived.elapsed().as_secs_f64();
         self.last_search_secs = searched.search_secs;
-        self.last_picture = Some(searched.arrived);
         self.num_searched += 1;
         let (raw, compressed) = (node.num_readers(&self.overlays) > 0, node.num_readers(&self.compressed_overlays) > 0);
         if !raw && !compressed {
@@ -95,8 +92,7 @@ impl Topics {
     }
 
     /// Counts a picture that could not be searched.
-    pub(super) fn failed(&mut self, arrived: Instant) {
-        self.last_picture = Some(arrived);
+    pub(super) fn failed(&mut self) {
         self.num_failed += 1;
     }
 
@@ -112,12 +108,7 @@ impl Topics {
             return;
         }
         self.last_diagnostics = Instant::now();
-        let stale = self.last_picture.is_none_or(|last| last.elapsed() > STALE_AFTER);
-        let (level, message) = match (has_model, stale) {
-            (false, _) => (DiagnosticStatus::WARN, "no grasp model yet".to_owned()),
-            (true, true) => (DiagnosticStatus::STALE, format!("no picture on {}", reader.topic)),
-            (true, false) => (DiagnosticStatus::OK, "pictures are searched".to_owned()),
-        };
+        let (level, message) = state(has_model, reader.shared.newest_arrival(), &reader.topic);
         let counts = &reader.shared.counts;
         let count = |name: &str, value: u64| KeyValue { key: name.to_owned(), value: value.to_string() };
         let secs = |name: &str, value: f64| KeyValue { key: name.to_owned(), value: format!("{:.1}", 1e3 * value) };
@@ -140,5 +131,29 @@ impl Topics {
         };
         let header = Header { stamp: Time::from_system(SystemTime::now()), frame_id: String::new() };
         self.told(self.diagnostics.send(DiagnosticArray { header, status: vec![status] }));
+    }
+}
+
+/// Level and message of the diagnostics. Pictures that arrive during a long search count.
+fn state(has_model: bool, newest_arrival: Option<Instant>, topic: &str) -> (u8, String) {
+    let is_stale = newest_arrival.is_none_or(|arrived| arrived.elapsed() > STALE_AFTER);
+    match (has_model, is_stale) {
+        (false, _) => (DiagnosticStatus::WARN, "no grasp model yet".to_owned()),
+        (true, true) => (DiagnosticStatus::STALE, format!("no picture on {topic}")),
+        (true, false) => (DiagnosticStatus::OK, "pictures are searched".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_is_stale_if_no_picture_arrives() {
+        let level = |newest_arrival| state(true, newest_arrival, "/image").0;
+        assert_eq!(level(None), DiagnosticStatus::STALE);
+        assert_eq!(level(Instant::now().checked_sub(2 * STALE_AFTER)), DiagnosticStatus::STALE);
+        assert_eq!(level(Some(Instant::now())), DiagnosticStatus::OK);
+        assert_eq!(state(false, None, "/image").0, DiagnosticStatus::WARN);
     }
 }
