@@ -1,6 +1,7 @@
 //! A camera file that gets new intrinsics.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
@@ -25,10 +26,14 @@ impl CameraUpdate {
     /// registered as an input: it is read again when it is written.
     ///
     /// # Errors
-    /// The file cannot be written, or does not have a camera file's layout.
+    /// The file cannot be written, or exists and cannot be read, is not text or does not have a camera file's layout.
     pub fn check(path: &Path) -> Result<()> {
         sdg_files::check_writable(path)?;
-        let Ok(text) = fs::read_to_string(path) else { return Ok(()) };
+        let text = match fs::read(path) {
+            Ok(bytes) => text_of(path, bytes)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(error).with_context(|| path.display().to_string()),
+        };
         let any = without_pose(DEFAULT_NAME.to_owned(), PinholeCamera::symmetric(640, 480, 500.0));
         if !text.trim().is_empty() {
             any.update_yaml(&text).with_context(|| path.display().to_string())?;
@@ -44,8 +49,7 @@ impl CameraUpdate {
         // The board and the pictures are inputs, which must not be replaced; the camera file itself may be updated.
         sdg_files::check_writable(path)?;
         let existing = match fs::exists(path) {
-            Ok(true) => String::from_utf8(sdg_files::read(path, MAX_BYTES)?)
-                .map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))?,
+            Ok(true) => text_of(path, sdg_files::read(path, MAX_BYTES)?)?,
             _ => String::new(),
         };
         Ok(Self { path: path.to_owned(), old: CalibratedCamera::from_yaml(&existing).ok(), existing })
@@ -78,6 +82,10 @@ impl CameraUpdate {
     }
 }
 
+fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    String::from_utf8(bytes).map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))
+}
+
 fn without_pose(name: String, intrinsics: PinholeCamera) -> CalibratedCamera {
     CalibratedCamera { name, intrinsics, table: None, flange_from_camera: None }
 }
@@ -106,5 +114,15 @@ mod tests {
         let error = refusal();
         assert!(error.contains("fold the picture"), "{error}");
         assert_eq!(fs::read_to_string(&path).unwrap(), text);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_updated_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("camera.yaml");
+        CameraUpdate::check(&path).unwrap();
+        fs::write(&path, [0xff, 0xfe]).unwrap();
+        let error = CameraUpdate::check(&path).unwrap_err().to_string();
+        assert!(error.ends_with("expected YAML, found bytes that are not text"), "{error}");
     }
 }
