@@ -295,6 +295,12 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
             && told.contains("an error of 10 % in the focal length gives"),
         "{told}"
     );
+    // Another estimate keeps the rest of the file.
+    let kept = "  workspace_m: {x: [-0.1, 0.1], y: [-0.2, 0.2]}\n# mine\n";
+    fs::write(&out, fs::read_to_string(&out).unwrap() + kept).unwrap();
+    stdout(&["camera", "table", &files.path("given.png"), "--out", &out, "--focal-px", "1000"]);
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.ends_with(kept) && written.contains("1000.0"), "{written}");
 }
 
 /// `poses.yaml` of a camera on the hand, and its pictures. With the inverse poses, in `beside.yaml`, the same result

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow};
 use image::RgbImage;
 use sdg_calibration::CalibratedCamera;
 use sdg_cell::{CellError, MountedCamera, Perception, camera_over_table};
@@ -119,12 +119,14 @@ pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> R
     MountedCamera::new(camera, workcell.mount, workcell.table_height_m).with_context(|| path.display().to_string())
 }
 
+/// The text of a camera file.
+pub(crate) fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    String::from_utf8(bytes).map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))
+}
+
 /// Reads a camera file, with or without a pose. Returns the camera, and the text for rewriting the file.
 pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
-    let bytes = sdg_files::read(path, MAX_BYTES)?;
-    let Ok(text) = String::from_utf8(bytes) else {
-        bail!("{}: expected YAML, found bytes that are not text", path.display());
-    };
+    let text = text_of(path, sdg_files::read(path, MAX_BYTES)?)?;
     let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
     Ok((camera, text))
 }

@@ -4,11 +4,11 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use sdg_calibration::{CalibratedCamera, UNCALIBRATED};
 use sdg_geometry::PinholeCamera;
 
-use crate::camera_files::MAX_BYTES;
+use crate::camera_files::{MAX_BYTES, text_of};
 
 /// Name of a camera in a new file.
 const DEFAULT_NAME: &str = "camera";
@@ -80,10 +80,6 @@ impl CameraUpdate {
         };
         Ok(sdg_files::extend(&path, Some(&path), text.as_bytes())?)
     }
-}
-
-fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
-    String::from_utf8(bytes).map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))
 }
 
 fn without_pose(name: String, intrinsics: PinholeCamera) -> CalibratedCamera {

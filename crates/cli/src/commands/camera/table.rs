@@ -94,9 +94,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
     sdg_files::check_extendable(out, args.camera.as_deref())?;
-    if existing.is_none() {
-        check_is_not_calibrated(out)?;
-    }
+    let estimate = if existing.is_none() { estimate_in(out)? } else { None };
     let camera_in_use = existing.as_ref().map(|(camera, _)| camera);
     let BoardPicture { size, corners, .. } = BoardPicture::read(&args.picture, &board, camera_in_use)?;
     let (camera, source) = match &existing {
@@ -109,12 +107,14 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
             if let Some(rms) = bent_px(&board, &corners) {
                 eprintln!("the sheet's lines are bent by {rms:.1} px RMS: calibrate the lens (sdg camera calibrate)");
             }
-            (camera, source)
+            // An earlier estimate may have a workspace.
+            let table = estimate.as_ref().and_then(|(old, _)| old.table.clone());
+            (CalibratedCamera { table, ..camera }, source)
         }
     };
     let sheet = locate_sheet(&camera.intrinsics, &board, &corners).with_context(|| named(&args.picture))?;
     let camera = placement.place(camera, &sheet);
-    let text = match &existing {
+    let text = match existing.as_ref().or(estimate.as_ref()) {
         Some((_, text)) => camera.update_yaml(text).with_context(|| named(out))?,
         None => camera.to_yaml(),
     };
@@ -126,17 +126,20 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Checks that a file which is replaced by an estimated camera contains nothing but another estimate: a file that cannot
-/// be read may be that of a camera with another lens model. It is not registered as an input, because it may be replaced.
-fn check_is_not_calibrated(out: &Path) -> Result<()> {
+/// The estimated camera in an existing file, which another estimate updates, and the file's text. It is not registered as
+/// an input, because it may be replaced.
+///
+/// # Errors
+/// The file contains something else: one that cannot be read may be that of a camera with another lens model.
+fn estimate_in(out: &Path) -> Result<Option<(CalibratedCamera, String)>> {
     let bytes = std::fs::read(out).unwrap_or_default();
-    let text = String::from_utf8_lossy(&bytes);
+    let text = String::from_utf8_lossy(&bytes).into_owned();
     if text.trim().is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     let out = named(out);
     let refusal = match CalibratedCamera::from_yaml(&text) {
-        Ok(camera) if camera.name == UNCALIBRATED => return Ok(()),
+        Ok(camera) if camera.name == UNCALIBRATED => return Ok(Some((camera, text))),
         Ok(_) => format!("{out}: expected --camera {out}, which keeps its lens, or another --out"),
         Err(error) => format!("--out: expected a new file or that of an estimated camera, found {out}: {error}"),
     };
