@@ -93,6 +93,12 @@ fn models_remain_if_the_base_weights_are_missing_or_the_marks_are_damaged() {
     assert!(text.contains("not taught: lever: ") && !text.contains("needs another photo"), "{text}");
     assert!(!model.exists() && Path::new(&out).join("index.html").exists());
     assert_eq!(fs::read(model.with_extension("sdg.before")).unwrap(), before);
+    // Of several parts, each has its reason.
+    let some = ["teach", "--model", "S", "--part", "lever", "--part", "rod_end"];
+    let output = sdg(&[&some[..], &arguments].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("not taught: lever: ") && error.contains("rod_end: "), "{error}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use sdg_evaluation::many_parts::{
     DemonstrationFolder, PartDemonstrations, PartOutcome, PartOutcomes, PartStore, PartTeaching, page,
 };
@@ -98,25 +98,28 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`; if a
-/// model fails its held-out samples, the outcome is that of a single part.
+/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`, after all
+/// parts were reported; if a model fails its held-out samples, the outcome is that of a single part.
 fn told(args: &TeachArgs, outcomes: PartOutcomes) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =
             outcomes.iter().map(|(name, outcome)| json!({ "name": name, "outcome": outcome })).collect();
         println!("{}", json!({ "parts": parts }));
     }
-    let mut result = Outcome::Done;
+    let mut result = Ok(Outcome::Done);
     for (name, outcome) in outcomes {
         if let Some(failure) = outcome.failure() {
             eprintln!("{} {name}: {failure}", Paint::stderr().text(Tone::Doubtful, "warning:"));
-            result = Outcome::ModelFails;
+            result = result.map(|_| Outcome::ModelFails);
         }
-        if let PartOutcome::Failed { why } = outcome {
-            bail!("{name}: {why}");
+        // The program prints the last error.
+        if let PartOutcome::Failed { why } = outcome
+            && let Err(earlier) = std::mem::replace(&mut result, Err(anyhow!("{name}: {why}")))
+        {
+            eprintln!("not taught: {earlier}");
         }
     }
-    Ok(result)
+    result
 }
 
 /// The command that makes the same page again.

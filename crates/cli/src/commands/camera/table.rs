@@ -126,8 +126,8 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The estimated camera in an existing file, which another estimate updates, and the file's text. It is not registered as
-/// an input, because it may be replaced.
+/// The estimated camera in an existing file, which another estimate updates, and the file's text. The file is not
+/// registered as an input, because it may be replaced.
 ///
 /// # Errors
 /// The file contains something else: one that cannot be read may be that of a camera with another lens model.
