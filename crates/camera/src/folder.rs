@@ -126,12 +126,12 @@ impl Source for Folder {
             }
         };
         self.next_at = Instant::now() + self.playback.interval.unwrap_or_default();
-        let read = read_finished(&path, self.frame);
-        self.mark_played(&path);
-        match read {
-            Ok((picture, captured)) => Ok(Some(Taken { picture, captured, num_skipped: 0 })),
-            Err(found) => Err(Missing::Torn(format!("{}: {found}", path.display()))),
+        let read = read_finished(&path, self.frame, deadline);
+        if !matches!(read, Err(Missing::Late)) {
+            self.mark_played(&path);
         }
+        let (picture, captured) = read?;
+        Ok(Some(Taken { picture, captured, num_skipped: 0 }))
     }
 
     fn is_on_request(&self) -> bool {
@@ -158,28 +158,36 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
     Ok(names)
 }
 
-/// Reads a picture and its modification time. A file that cannot be decoded is read again while it may still grow.
-fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, SystemTime), String> {
+/// Reads a picture and its modification time. A file that cannot be decoded is read again while it may still grow; one
+/// that grows is not read before the deadline, and is late if it is not complete then.
+fn read_finished(path: &Path, frame: PixelFrame, deadline: Instant) -> Result<(image::RgbImage, SystemTime), Missing> {
+    let torn = |found: String| Missing::Torn(format!("{}: {found}", path.display()));
+    let failed = |error: std::io::Error| torn(error.to_string());
     let mut unchanged: Option<(u64, Instant)> = None;
     loop {
-        let mut bytes = Vec::new();
-        let file = File::open(path).map_err(|error| error.to_string())?;
-        let changed = file.metadata().and_then(|metadata| metadata.modified());
-        let read =
-            file.take(MAX_ENCODED_BYTES as u64 * 8 + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-        let found = match decode(&bytes, frame) {
-            Ok(picture) => return Ok((picture, changed.unwrap_or_else(|_| SystemTime::now()))),
-            Err(found) => found,
-        };
-        match unchanged {
-            Some((length, since)) if length == read as u64 && since.elapsed() >= UNCHANGED_TIME => return Err(found),
-            Some((length, _)) if length == read as u64 => {}
-            _ => unchanged = Some((read as u64, Instant::now())),
+        let file = File::open(path).map_err(failed)?;
+        let metadata = file.metadata().map_err(failed)?;
+        let (length, changed) = (metadata.len(), metadata.modified());
+        let is_growing = unchanged.is_some_and(|(before, _)| before != length);
+        if !is_growing || Instant::now() >= deadline {
+            let mut bytes = Vec::new();
+            file.take(MAX_ENCODED_BYTES as u64 * 8 + 1).read_to_end(&mut bytes).map_err(failed)?;
+            let found = match decode(&bytes, frame) {
+                Ok(picture) => return Ok((picture, changed.unwrap_or_else(|_| SystemTime::now()))),
+                Err(found) => found,
+            };
+            if is_growing {
+                return Err(Missing::Late);
+            }
+            // A file that was modified long ago is complete.
+            let age = changed.ok().and_then(|changed| changed.elapsed().ok());
+            let is_old = age.is_some_and(|age| age > UNCHANGED_TIME * 4);
+            if is_old || unchanged.is_some_and(|(_, since)| since.elapsed() >= UNCHANGED_TIME) {
+                return Err(torn(found));
+            }
         }
-        // A file that was modified long ago is complete.
-        let age = changed.ok().and_then(|changed| changed.elapsed().ok());
-        if age.is_some_and(|age| age > UNCHANGED_TIME * 4) {
-            return Err(found);
+        if is_growing || unchanged.is_none() {
+            unchanged = Some((length, Instant::now()));
         }
         sleep(POLL_INTERVAL);
     }
@@ -258,6 +266,26 @@ mod tests {
         let mut folder = open(&files, Playback::default());
         assert!(matches!(folder.take(soon()), Err(Missing::Torn(found)) if found.contains("a.png")));
         assert_eq!(level(&mut folder), Some(2));
+    }
+
+    #[test]
+    fn a_file_that_keeps_growing_is_late_and_read_when_it_is_complete() {
+        let files = tempfile::tempdir().unwrap();
+        let bytes = png(1);
+        write(&files, "a.png", &bytes[..40]);
+        let path = files.path().join("a.png");
+        // In about 60 parts, within 0.3 s.
+        let writer = std::thread::spawn(move || {
+            let mut file = fs::OpenOptions::new().append(true).open(path).unwrap();
+            for part in bytes[40..].chunks(bytes.len().div_ceil(60)) {
+                sleep(Duration::from_millis(5));
+                file.write_all(part).unwrap();
+            }
+        });
+        let mut folder = open(&files, Playback::default());
+        assert!(matches!(folder.take(soon()), Err(Missing::Late)));
+        writer.join().unwrap();
+        assert_eq!(level(&mut folder), Some(1));
     }
 
     #[test]
