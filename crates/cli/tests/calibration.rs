@@ -378,6 +378,9 @@ fn a_camera_on_the_hand_is_found_and_written() {
     let (poses, _) = hand_eye(&files, &camera, 1.0);
     let arguments = ["camera", "hand-eye", "--camera", &other, "--poses", &poses, "--mount", "hand"];
     assert_refused(&arguments, 1, &["1280 × 720", "640 × 480", "at least 4 pictures"]);
+    // The file of a camera on the hand has no table.
+    let with_table = [&arguments[..], &["--table-height-mm", "10"]].concat();
+    assert_refused(&with_table, 2, &["--table-height-mm: expected --mount base"]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use sdg_inputs::{camera_files, robot_poses};
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, named};
-use crate::exit::{Outcome, one_line};
+use crate::exit::{Outcome, Usage, one_line};
 use crate::shared_args::table_height_mm;
 
 /// `sdg camera hand-eye`
@@ -61,8 +61,11 @@ const MAX_RMS_RATIO: f64 = 3.0;
 
 /// Finds the pose of the camera on the robot's hand or beside the robot.
 pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
-    let board = args.board.read()?;
     let mount = Mount::from(args.mount);
+    if args.table_height_mm.is_some() && mount == Mount::Hand {
+        return Err(Usage("--table-height-mm: expected --mount base, found --mount hand".to_owned()).into());
+    }
+    let board = args.board.read()?;
     let (camera, existing) = camera_files::read(&args.camera)?;
     let poses = robot_poses::read(&args.poses)?;
     if let Some(out) = &args.out {

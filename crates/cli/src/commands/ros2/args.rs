@@ -108,7 +108,7 @@ pub struct ArmArgs {
     #[arg(long, value_name = "RATIO", default_value_t = 0.5, value_parser = positive)]
     pub gripper_ratio: f64,
     /// Fraction of the joints' velocity limits, above 0 and at most 0.6, unless a request gives another
-    #[arg(long, value_name = "SHARE", default_value_t = sdg_robot::DEFAULT_SPEED)]
+    #[arg(long, value_name = "SHARE", default_value_t = sdg_robot::DEFAULT_SPEED, requires = "allow_motion")]
     pub speed: f64,
     /// The parts' height
     #[command(flatten)]

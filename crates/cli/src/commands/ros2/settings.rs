@@ -55,10 +55,11 @@ impl CellFiles {
 /// Reads the other files of the node.
 ///
 /// # Errors
-/// A file cannot be used; a table height is given without a base frame; a model without lengths is given or is to be
+/// A file cannot be used; a height is given without the option that uses it; a model without lengths is given or is to be
 /// taught, although the node needs lengths.
 pub(super) fn node_settings(args: &Ros2Args, files: &CellFiles, interrupt: &Interrupt) -> Result<Settings> {
     check_trigger(args)?;
+    check_told_height(args)?;
     let device = devices::open(&args.compute)?;
     let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
     if args.table_height_mm.is_some() && args.base_frame.is_none() {
@@ -114,6 +115,14 @@ fn check_trigger(args: &Ros2Args) -> Result<(), Usage> {
         return Err(Usage(format!("--teach-demo: expected --camera and --teach-mark-height-mm, because {why}")));
     }
     Ok(())
+}
+
+/// Checks that a given height of marks is used, which only grasps do.
+fn check_told_height(args: &Ros2Args) -> Result<(), Usage> {
+    match (args.arm.height.mark_height_mm, args.arm.allow_motion) {
+        (Some(_), false) => Err(Usage("--mark-height-mm: expected --allow-motion, found none".to_owned())),
+        _ => Ok(()),
+    }
 }
 
 /// Reads and checks the camera of the grasp service, and checks the speed.
@@ -196,6 +205,18 @@ mod tests {
             check_trigger(&parsed(&line).unwrap()).unwrap();
         }
         assert!(parsed(&format!("{teach} --teach-mark-height-mm 16")).is_err(), "the height needs a camera");
+    }
+
+    #[test]
+    fn options_of_grasps_need_the_permission_to_move() {
+        let moving = "ros2 --allow-motion --workcell cell.toml";
+        assert!(parsed("ros2 --speed 0.2").is_err());
+        assert_eq!(parsed(&format!("{moving} --speed 0.2")).unwrap().arm.speed, 0.2);
+        let error = check_told_height(&parsed("ros2 --mark-height-mm 16").unwrap()).unwrap_err().to_string();
+        assert!(error.starts_with("--mark-height-mm: expected --allow-motion"), "{error}");
+        for line in ["ros2".to_owned(), format!("{moving} --mark-height-mm 16")] {
+            check_told_height(&parsed(&line).unwrap()).unwrap();
+        }
     }
 
     #[test]
