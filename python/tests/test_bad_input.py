@@ -281,10 +281,14 @@ def test_a_negative_with_the_part_is_told(tmp_path: Path) -> None:
 
 def test_trackers(shape_model: sdg.GraspModel) -> None:
     tracker = sdg.Tracker(shape_model)
+    for unusable in (float("nan"), float("inf")):
+        with pytest.raises(sdg.ArgumentError, match="captured_s to be finite, found"):
+            tracker.frame(GREY, captured_s=unusable)
+    # The first time may be any.
+    tracker.frame(GREY, captured_s=-1.0)
     tracker.frame(GREY, captured_s=1.0)
-    for earlier in (0.5, float("nan"), float("inf")):
-        with pytest.raises(sdg.ArgumentError, match="captured_s of at least 1"):
-            tracker.frame(GREY, captured_s=earlier)
+    with pytest.raises(sdg.ArgumentError, match="captured_s of at least 1, the previous frame's, found 0.5"):
+        tracker.frame(GREY, captured_s=0.5)
     tracker.close()
     with pytest.raises(sdg.ClosedError, match="found one that was closed"):
         tracker.frame(GREY, captured_s=2.0)

@@ -21,7 +21,8 @@ pub struct Tracker {
     /// Id of the process that has the search thread.
     pid: u32,
     threads: Option<usize>,
-    last_secs: f64,
+    /// The times of the first and the last frame; `None` before the first.
+    times_secs: Option<[f64; 2]>,
 }
 
 impl Tracker {
@@ -36,33 +37,35 @@ impl Tracker {
         let as_it_takes = SearchTime::AsItTakes { threads: view.threads };
         let search_time = search_frames.map_or(as_it_takes, SearchTime::Frames);
         let tracker = LiveTracker::new(&perception, TrackerConfig::DEFAULT, search_time)?;
-        Ok(Self { perception, tracker: Some(tracker), pid: process::id(), threads: view.threads, last_secs: 0.0 })
+        Ok(Self { perception, tracker: Some(tracker), pid: process::id(), threads: view.threads, times_secs: None })
     }
 
     /// The parts in a frame as JSON, with the fields of `sdg detect --from --json`; `captured_secs` is measured from
     /// any fixed time.
     ///
     /// # Errors
-    /// The tracker was closed; the time is before that of the last frame, the picture's size differs from the camera's,
-    /// or the region is not inside the picture; a search fails; the errors of threads as for [`Model::detect`].
+    /// The tracker was closed; the time is not finite or before that of the last frame; the picture's size differs from
+    /// the camera's, or the region is not inside the picture; a search fails; the errors of threads as for
+    /// [`Model::detect`].
     pub fn frame(&mut self, picture: RgbImage, captured_secs: f64) -> Result<String> {
         let Some(tracker) = self.tracker.as_mut() else {
             return Err(Fault::new(FaultKind::Closed, "expected a tracker that is open, found one that was closed"));
         };
-        let Some(captured) =
-            Duration::try_from_secs_f64(captured_secs).ok().filter(|_| captured_secs >= self.last_secs)
-        else {
-            return Err(Fault::new(
-                FaultKind::Argument,
-                format!(
-                    "expected captured_s of at least {}, the previous frame's, found {captured_secs}",
-                    self.last_secs
-                ),
-            ));
+        let refused = |expected: String| {
+            Fault::new(FaultKind::Argument, format!("expected captured_s {expected}, found {captured_secs}"))
         };
+        if !captured_secs.is_finite() {
+            return Err(refused("to be finite".to_owned()));
+        }
+        let [first_secs, last_secs] = self.times_secs.unwrap_or([captured_secs; 2]);
+        if captured_secs < last_secs {
+            return Err(refused(format!("of at least {last_secs}, the previous frame's")));
+        }
+        let captured = Duration::try_from_secs_f64(captured_secs - first_secs)
+            .map_err(|_| refused(format!("less than 2^64 seconds after {first_secs}, the first frame's")))?;
         self.perception.check_picture(&picture)?;
         let parts = on_threads(self.threads, || tracker.frame(Arc::new(picture), captured))??;
-        self.last_secs = captured_secs;
+        self.times_secs = Some([first_secs, captured_secs]);
         let detections: Vec<&GraspDetection> = parts.iter().map(|part| &part.detection).collect();
         let touched = self.perception.touched_among_accepted(&detections, |idx| parts[idx].is_followed());
         let record = |(part, jaws_touch): (TrackedPart, Vec<usize>)| PartRecord {
