@@ -421,9 +421,10 @@ impl PartFinder<Cell> for SearchedAt {
 #[test]
 fn a_part_is_searched_at_the_measured_height_of_its_place() {
     let camera = CameraPose::InBase(Isometry3::identity());
-    let (config, goal, placing) = (config(), tray().goal(1).unwrap(), PlacingConfig::default());
+    let goal = Place { surface_m: 0.03, ..tray() }.goal(1).unwrap();
+    let (config, placing) = (config(), PlacingConfig::default());
     // A contact within 2 mm of the expected one counts as that.
-    for (lower_m, expected_m) in [(0.001, 0.02), (0.006, 0.014)] {
+    for (lower_m, expected_m) in [(0.001, 0.05), (0.006, 0.044)] {
         let mut cell = Cell { lower_m, ..cell(Isometry3::identity()) };
         let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
         let mut finder = SearchedAt(f64::NAN);
