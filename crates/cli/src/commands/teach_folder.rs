@@ -98,8 +98,8 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`, after all
-/// parts were reported; if a model fails its held-out samples, the outcome is that of a single part.
+/// Reports the parts selected by `--part`. If a part could not be taught, the call fails, as without `--demos`, after
+/// all parts were reported; if a model fails its held-out samples, the outcome is that of a single part.
 fn told(args: &TeachArgs, outcomes: PartOutcomes) -> Result<Outcome> {
     if args.json {
         let parts: Vec<Value> =

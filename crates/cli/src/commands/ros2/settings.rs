@@ -55,8 +55,8 @@ impl CellFiles {
 /// Reads the other files of the node.
 ///
 /// # Errors
-/// A file cannot be used; a height is given without the option that uses it; a model without lengths is given or is to be
-/// taught, although the node needs lengths.
+/// A file cannot be used; a height is given without the option that uses it; a model without lengths is given or is to
+/// be taught, although the node needs lengths.
 pub(super) fn node_settings(args: &Ros2Args, files: &CellFiles, interrupt: &Interrupt) -> Result<Settings> {
     check_trigger(args)?;
     check_told_height(args)?;
