@@ -438,10 +438,7 @@ fn a_part_that_touches_an_object_above_its_place_is_kept() {
     let mut onto = Cell { lower_m: -0.012, ..cell(Isometry3::identity()) };
     let report = run(&mut onto, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
     let PlacingOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
-    assert_eq!(
-        why,
-        "the contact was 12 mm above the place, at most 10 mm are allowed; the part is still held"
-    );
+    assert_eq!(why, "the contact was 12 mm above the place, at most 10 mm are allowed; the part is still held");
     assert_eq!(onto.loads_kg, [0.0, 0.3]);
     // In a bin it may be another part.
     let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() };
