@@ -24,7 +24,7 @@ use crate::search_window::{SearchWindow, check_region};
 use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
-use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
+use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence, with_size};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot, search};
 
 /// Minimum length of the shorter side of an image, in pixels. Chosen by hand, not measured: larger than the minimum
@@ -366,6 +366,11 @@ impl GraspModel {
         earlier_log_sizes: &[(usize, f64)],
     ) -> Vec<(f64, Contributions)> {
         judge_picture_of_sequence(clues, earlier_log_sizes, &self.demonstrations[0].check().score)
+    }
+
+    /// The verdict on a detection with this evidence, but with another contribution of the size.
+    pub(crate) fn verdict_with_size(&self, evidence: Contributions, size: f64) -> (f64, Contributions) {
+        with_size(evidence, size, &self.demonstrations[0].check().score)
     }
 
     /// Number of keypoints of a detection of this model.
