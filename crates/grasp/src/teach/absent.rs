@@ -361,7 +361,8 @@ mod tests {
             samples.flat_map(|sample| sample.image.into_raw()).max()
         };
         assert_eq!(brightest(whole), Some(200));
-        assert_eq!(brightest(|picture: &RgbImage| SearchWindow::middle_of(picture.dimensions().into(), [240, 180])), Some(20));
+        let middle = |picture: &RgbImage| SearchWindow::middle_of(picture.dimensions().into(), [240, 180]);
+        assert_eq!(brightest(middle), Some(20));
     }
 
     #[test]
