@@ -11,6 +11,7 @@ use std::ops::RangeInclusive;
 use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use sdg_geometry::Slant;
+use sdg_shape::SearchConfig;
 
 use crate::check_config::CheckConfig;
 use crate::detection::{Found, GraspDetection, Placement};
@@ -24,7 +25,7 @@ use crate::search_window::{SearchWindow, check_region};
 use crate::sighting::{Sighting, sightings};
 use crate::slanted::{LevelImage, explains_more, suggested_slant};
 use crate::taught::TaughtDemonstration;
-use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
+use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence, with_size};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot, search};
 
 /// Minimum length of the shorter side of an image, in pixels. Chosen by hand, not measured: larger than the minimum
@@ -112,7 +113,7 @@ impl GraspModel {
         self.with_check(|check| check.search.scales = tolerance.clone())
     }
 
-    /// The model with another maximum number of parts in a picture; the default is 100.
+    /// The model with another maximum number of parts in a picture; the default is 100. A search for more takes longer.
     ///
     /// # Errors
     /// [`GraspError::InvalidConfig`] for 0.
@@ -122,8 +123,11 @@ impl GraspModel {
         }
         self.with_check(|check| {
             check.max_detections = max_detections;
-            // All matches are scored before the best ones are kept.
+            // All matches are scored before the best ones are kept. More parts need more starts in proportion.
             check.search.max_matches = max_detections.max(CheckConfig::DEFAULT_MAX_DETECTIONS);
+            let max_starts = SearchConfig::DEFAULT_MAX_STARTS.saturating_mul(check.search.max_matches);
+            check.search.max_starts =
+                (max_starts / CheckConfig::DEFAULT_MAX_DETECTIONS).min(SearchConfig::LARGEST_MAX_STARTS);
         })
     }
 
@@ -368,6 +372,11 @@ impl GraspModel {
         judge_picture_of_sequence(clues, earlier_log_sizes, &self.demonstrations[0].check().score)
     }
 
+    /// The verdict on a detection with this evidence, but with another contribution of the size.
+    pub(crate) fn verdict_with_size(&self, evidence: Contributions, size: f64) -> (f64, Contributions) {
+        with_size(evidence, size, &self.demonstrations[0].check().score)
+    }
+
     /// Number of keypoints of a detection of this model.
     pub(crate) fn num_keypoints(&self) -> usize {
         if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }
@@ -446,6 +455,17 @@ mod tests {
         drop_repeated(&mut found, |found| &found.detection);
         let kept: Vec<_> = found.iter().map(|kept| (kept.detection.bbox.x1, kept.detection.network_score)).collect();
         assert_eq!(kept, [(0.0, 0.7), (100.0, 0.2)]);
+    }
+
+    #[cfg(feature = "teach")]
+    #[test]
+    fn more_parts_than_by_default_have_more_starts() {
+        let model = crate::drawn_part::model([320, 240]);
+        let starts = [1, 100, 200, usize::MAX].map(|max_detections| {
+            let model = model.clone().with_max_detections(max_detections).unwrap();
+            model.demonstrations()[0].check().search.max_starts
+        });
+        assert_eq!(starts, [1024, 1024, 2048, 4096]);
     }
 
     #[test]

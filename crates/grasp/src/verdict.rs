@@ -214,8 +214,18 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         added: closely(&config.added, &|close| close.added),
         mirror: closely(&config.mirror, &|close| close.mirrored.map_or(0.0, rivals_gain)),
     };
+    (score(&contributions, config), contributions)
+}
+
+/// A verdict whose evidence has another contribution of the size.
+pub(crate) fn with_size(evidence: Contributions, size: f64, config: &ScoreConfig) -> (f64, Contributions) {
+    let contributions = Contributions { size, ..evidence };
+    (score(&contributions, config), contributions)
+}
+
+fn score(contributions: &Contributions, config: &ScoreConfig) -> f64 {
     let log_odds = config.bias + contributions.by_kind().map(|(_, log_odds)| log_odds).sum::<f64>();
-    (1.0 / (1.0 + (-log_odds).exp()), contributions)
+    1.0 / (1.0 + (-log_odds).exp())
 }
 
 /// The difference by which the rival (the mirror image) fits better than the photo; 0 if the two differ too little. The
@@ -253,6 +263,16 @@ pub(crate) mod tests {
 
     fn score(clues: Clues) -> f64 {
         judge(&clues, None, &ScoreConfig::DEFAULT).0
+    }
+
+    #[test]
+    fn another_size_changes_the_score_as_if_judged_with_it() {
+        let config = ScoreConfig::DEFAULT;
+        let larger = Clues { log_size: 0.15, ..clear() };
+        let [alone, beside] = [None, Some(0.0)].map(|reference| judge(&larger, reference, &config));
+        assert!(beside.0 < alone.0);
+        assert_eq!(with_size(alone.1, beside.1.size, &config), beside);
+        assert_eq!(with_size(beside.1, 0.0, &config), alone);
     }
 
     #[test]

@@ -145,7 +145,7 @@ pub fn write_marks(
     }
 }
 
-/// Checks that an existing file gives these objects their labels.
+/// Checks that an existing file gives these objects their labels and the direction of their grasps.
 fn check_labels(
     path: &Path,
     written: &WrittenAnnotation,
@@ -163,6 +163,16 @@ fn check_labels(
                 path.display(),
                 expected.label,
                 found.label
+            );
+        }
+        let is_reversed = found.grasp.zip(expected.grasp).is_some_and(|(found, expected)| {
+            (found.start - expected.end).norm() < (found.start - expected.start).norm()
+        });
+        if is_reversed {
+            bail!(
+                "{}: expected no `kpt_names`, or `grasp_start` before `grasp_end` as in the written lines, found the \
+                 other order: write into another folder",
+                path.display()
             );
         }
     }
@@ -189,6 +199,26 @@ mod tests {
             fs::write(at(name), "").unwrap();
             assert_eq!(beside_photo(&at("images/train/a.jpg")).unwrap(), at(name));
         }
+    }
+
+    #[test]
+    fn a_dataset_that_would_reverse_the_grasp_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (labels, output) = (folder.path().join(DATA_YAML), folder.path().join("a.txt"));
+        let image = ImageFacts { width: 640, height: 480, file_name: None };
+        let data_yaml = "kpt_shape: [2, 3]\nnames: [rod]\n";
+        let marks = b"0 0.5 0.5 0.25 0.5 0.4 0.5 2 0.6 0.5 2\n";
+        let objects = Annotation::read_with(marks, Some(data_yaml.as_bytes()), &image).unwrap();
+        let written = AnnotationFormat::YoloPose.write(&image, &objects).unwrap();
+        let instances: Vec<_> = objects.into_iter().map(|object| LabelledInstance::new(object, false)).collect();
+        let write_beside = |names: &str| {
+            fs::write(&labels, format!("{data_yaml}kpt_names:\n  0: [{names}]\n")).unwrap();
+            write_marks(&output, &written, &image, &instances)
+        };
+        let refused = write_beside("grasp_end, grasp_start").unwrap_err().to_string();
+        assert!(refused.contains("kpt_names") && !output.exists(), "{refused}");
+        assert_eq!(write_beside("grasp_start, grasp_end").unwrap(), Some(labels.clone()));
+        assert!(output.exists());
     }
 
     #[test]

@@ -58,6 +58,7 @@ impl TeachingFiles<'_> {
             check_region_from_above(region, &seen, &camera.over_table, &lengths)?;
         }
         options.lengths = Some(lengths);
+        options.over_table = Some(camera.over_table);
         Ok(seen)
     }
 }

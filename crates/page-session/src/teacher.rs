@@ -124,6 +124,7 @@ impl PageTeacher {
                 check_region_from_above(region, &seen, &camera.over_table, &lengths)?;
             }
             options.lengths = Some(lengths);
+            options.over_table = Some(camera.over_table);
             demonstrations = Cow::Owned(seen);
         }
         let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))?;

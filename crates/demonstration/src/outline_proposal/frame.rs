@@ -87,8 +87,19 @@ impl Frame {
     }
 
     /// A point of the photo, in pixels of the frame.
-    fn place_of(&self, point: &Point2<f64>) -> Point2<f64> {
+    pub fn place_of(&self, point: &Point2<f64>) -> Point2<f64> {
         Point2::new((point.x - self.origin[0]) / self.scale[0], (point.y - self.origin[1]) / self.scale[1])
+    }
+
+    /// The pixel at a point of the photo; `None` outside the frame.
+    pub fn pixel_of(&self, point: &Point2<f64>) -> Option<usize> {
+        self.pixel_at(&self.place_of(point))
+    }
+
+    /// The pixel at a place in pixels of the frame; `None` outside the frame.
+    fn pixel_at(&self, at: &Point2<f64>) -> Option<usize> {
+        let lies_in = (0.0..self.width as f64).contains(&at.x) && (0.0..self.height() as f64).contains(&at.y);
+        lies_in.then(|| at.y as usize * self.width + at.x as usize)
     }
 
     /// The stroke in pixels of the frame, as far as it lies in the box; `None` outside the box.
@@ -101,8 +112,7 @@ impl Frame {
             let steps = (2.0 * (to - from).norm()).ceil().min(2.0 * (self.width + self.height()) as f64) as usize;
             for step in 0..=steps {
                 let at = from + (to - from) * (step as f64 / steps.max(1) as f64);
-                let lies_in = (0.0..self.width as f64).contains(&at.x) && (0.0..self.height() as f64).contains(&at.y);
-                let pixel = if lies_in { at.y as usize * self.width + at.x as usize } else { continue };
+                let Some(pixel) = self.pixel_at(&at) else { continue };
                 if self.candidates[pixel] {
                     pixels.push(pixel);
                 }

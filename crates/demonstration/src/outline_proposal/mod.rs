@@ -23,6 +23,7 @@
 mod color_mixture;
 mod frame;
 mod guesses;
+mod joined;
 mod lab;
 mod minimal_cut;
 mod pieces;
@@ -33,6 +34,7 @@ use image::RgbImage;
 use sdg_geometry::{BoundingBox, Polygon, outer_outline};
 
 use frame::Frame;
+use joined::joined;
 pub use stroke::OutlineStroke;
 use strokes::Correction;
 
@@ -59,29 +61,34 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[Out
     outline_in(image, bbox, None, strokes)
 }
 
-/// Corrects an existing outline by strokes in drawing order: areas far from all strokes stay as they are. Only the part
-/// of the outline inside the box counts.
+/// Corrects an existing outline by strokes in drawing order: areas far from all strokes stay as they are. Where the
+/// outline lies beyond the box, the box is extended.
 ///
-/// The result is like that of [`propose_outline`]: in the box, in steps of the reduced photo, and the box itself if
-/// nothing is left.
+/// Where something was changed, the result is like that of [`propose_outline`]: in the box, in steps of the reduced
+/// photo. Elsewhere the outline keeps its vertices, if both can be joined. If nothing is left, the result is the box
+/// itself.
 pub fn correct_outline(image: &RgbImage, bbox: &BoundingBox, outline: &Polygon, strokes: &[OutlineStroke]) -> Polygon {
     outline_in(image, bbox, Some(outline), strokes)
 }
 
 /// The outline in the box, detected or corrected.
 fn outline_in(image: &RgbImage, bbox: &BoundingBox, known: Option<&Polygon>, strokes: &[OutlineStroke]) -> Polygon {
-    let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
+    let [width, height] = [image.width(), image.height()].map(f64::from);
+    let inside = bbox.clip(width, height);
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
-    let Some(frame) = Frame::cut_out(image, &inside, MAX_PIXELS) else { return nothing_found() };
+    let with_box = |known: &Polygon| BoundingBox::around(known.vertices.iter().copied().chain(bbox.corners()));
+    let searched = known.and_then(with_box).map_or(inside, |bounds| bounds.clip(width, height));
+    let Some(frame) = Frame::cut_out(image, &searched, MAX_PIXELS) else { return nothing_found() };
     let Some(in_part) = segment(&frame, known, strokes) else { return nothing_found() };
     let Some(outline) = outer_outline(&frame.mask(&in_part)) else { return nothing_found() };
     // Pieces of the mask extend to the edges of whole pixels; the box may end within one.
-    let outline = frame.in_photo(&outline, &inside);
-    if outline.area() >= MIN_AREA_SHARE * inside.area() && !outline.crosses_itself() {
-        outline
-    } else {
-        nothing_found()
+    let outline = frame.in_photo(&outline, &searched);
+    if outline.area() < MIN_AREA_SHARE * inside.area() || outline.crosses_itself() {
+        return nothing_found();
     }
+    let Some(known) = known else { return outline };
+    let changed: Vec<bool> = frame.pixels_of(known).iter().zip(&in_part).map(|(was, is)| was != is).collect();
+    joined(&frame, known, &outline, &changed).unwrap_or(outline)
 }
 
 /// The part's pixels, from a known outline or detected; `None` if nothing stands out.
@@ -161,6 +168,41 @@ mod tests {
         let points = [85.0, 100.0, 115.0].map(|y| Point2::new(60.0, y)).to_vec();
         let corrected = correct_outline(&image, &bbox, &drawn, &[OutlineStroke { points, is_inside: true }]);
         assert!(corrected.contains(&missing) && corrected.contains(&corner), "{corrected:?}");
+    }
+
+    /// The vertices of an arc of a disc's rim, in steps of 5°.
+    fn arc(middle: f64, radius: f64, steps: std::ops::Range<i32>) -> Polygon {
+        let at = |step: i32| {
+            let (sin, cos) = f64::from(5 * step).to_radians().sin_cos();
+            Point2::new(middle + radius * cos, middle + radius * sin)
+        };
+        Polygon { vertices: steps.map(at).collect() }
+    }
+
+    #[test]
+    fn far_from_the_stroke_a_large_outline_keeps_its_vertices() {
+        let (image, bbox) = disc(1600, 600.0);
+        // The disc's left side is missing.
+        let known = arc(800.0, 600.0, -24..25);
+        let missing = Point2::new(350.0, 800.0);
+        assert!(!known.contains(&missing));
+        let points = [700.0, 800.0, 900.0].map(|y| Point2::new(350.0, y)).to_vec();
+        let corrected = correct_outline(&image, &bbox, &known, &[OutlineStroke { points, is_inside: true }]);
+        assert!(corrected.contains(&missing), "{corrected:?}");
+        for vertex in known.vertices.iter().filter(|vertex| vertex.x > 900.0) {
+            assert!(corrected.vertices.contains(vertex), "{vertex} of {corrected:?}");
+        }
+    }
+
+    #[test]
+    fn a_known_outline_beyond_the_box_is_kept() {
+        let (image, _) = disc(200, 50.0);
+        let known = arc(100.0, 50.0, 0..72);
+        let bbox = BoundingBox { x1: 70.0, y1: 70.0, x2: 130.0, y2: 130.0 };
+        let stroke = OutlineStroke { points: vec![Point2::new(100.0, 100.0)], is_inside: true };
+        let corrected = correct_outline(&image, &bbox, &known, &[stroke]);
+        assert!(corrected.contains(&Point2::new(55.0, 100.0)) && corrected.contains(&Point2::new(100.0, 145.0)));
+        assert!((corrected.area() / known.area() - 1.0).abs() < 0.02, "{corrected:?}");
     }
 
     #[test]

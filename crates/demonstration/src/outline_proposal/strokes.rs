@@ -196,7 +196,7 @@ fn mean<'a>(colors: impl Iterator<Item = &'a Lab>) -> Lab {
 }
 
 /// The marked pixels and those up to this many horizontal and vertical steps away.
-fn grown(marked: &[bool], width: usize, steps: usize) -> Vec<bool> {
+pub(crate) fn grown(marked: &[bool], width: usize, steps: usize) -> Vec<bool> {
     let mut grown = marked.to_vec();
     let mut rim: Vec<usize> = (0..marked.len()).filter(|&at| marked[at]).collect();
     for _ in 0..steps {

@@ -189,19 +189,36 @@ impl PlanViewDetector {
 
     /// Detections in a picture, in pixels of the plan view.
     pub(crate) fn find(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
+        if let Some(region) = self.region() {
+            region.check(picture.dimensions().into())?;
+        }
+        let window = self.search_window()?;
+        self.find_in(&self.window_of(picture, &window.rect), &window, verification)
+    }
+
+    /// Detections in the plan view of a whole picture, in its pixels.
+    #[cfg(feature = "teach")]
+    pub(crate) fn find_in_view(&self, view: &RgbImage) -> Result<Vec<Found>> {
+        let window = self.search_window()?;
+        self.find_in(&window.cut(view), &window, Verification::ByShape)
+    }
+
+    /// The searched window of the plan view.
+    fn search_window(&self) -> Result<SearchWindow> {
         let size = self.view_size();
-        let window = match &self.region {
-            None => SearchWindow::whole(size),
-            Some(region) => {
-                region.region.check(picture.dimensions().into())?;
-                region.window(size, self.model.demonstrations())?
-            }
-        };
+        match &self.region {
+            None => Ok(SearchWindow::whole(size)),
+            Some(region) => region.window(size, self.model.demonstrations()),
+        }
+    }
+
+    /// Detections in a window of the plan view, in pixels of the whole plan view.
+    fn find_in(&self, image: &RgbImage, window: &SearchWindow, verification: Verification) -> Result<Vec<Found>> {
         let counts = |detection: &GraspDetection| {
             let placed = self.placed(detection.clone());
             placed.is_some_and(|placed| placed.detection.lies_within(self.region(), self.picture_size()))
         };
-        read_sync(self.model.find_in(&self.window_of(picture, &window.rect), &window, verification, counts))
+        read_sync(self.model.find_in(image, window, verification, counts))
     }
 
     /// Width and height of the camera's pictures.

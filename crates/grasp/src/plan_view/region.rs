@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanView, PosedCamera};
 
-use crate::error::Result;
+use crate::error::{GraspError, Result};
 use crate::region::{RegionError, SearchRegion};
 use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
@@ -18,6 +18,8 @@ pub(super) struct RegionInPlanView {
     pub(super) region: SearchRegion,
     /// The bounding box in pixels of the plan view.
     bounds: BoundingBox,
+    /// Pixels of the picture per pixel of the plan view, in the middle of the bounds.
+    picture_per_view: f64,
 }
 
 impl RegionInPlanView {
@@ -35,17 +37,57 @@ impl RegionInPlanView {
         });
         let seen = points.filter_map(|point| view.from_picture(camera, &point));
         let bounds = BoundingBox::around(seen).map(|bounds| bounds.clip(f64::from(view.width), f64::from(view.height)));
-        match bounds.filter(|bounds| bounds.area() > 0.0) {
-            Some(bounds) => Ok(Self { region: *region, bounds }),
-            None => Err(RegionError::OffTable { region: *region }.into()),
-        }
+        let Some(bounds) = bounds.filter(|bounds| bounds.area() > 0.0) else {
+            return Err(RegionError::OffTable { region: *region }.into());
+        };
+        let middle = camera.project(&view.point(&bounds.center()));
+        let metres_per_pixel = middle.and_then(|middle| camera.metres_per_pixel(&middle, view.height_m));
+        let picture_per_view = metres_per_pixel.map_or(1.0, |metres| 1.0 / (metres * view.pixels_per_m));
+        Ok(Self { region: *region, bounds, picture_per_view })
     }
 
     /// The window that is cut out of a plan view of size `view_size`.
     ///
     /// # Errors
-    /// A region that is too small for the part.
+    /// A region that is too small for the part; the lengths are in pixels of the picture, like the region.
     pub(super) fn window(&self, view_size: [u32; 2], demonstrations: &[TaughtDemonstration]) -> Result<SearchWindow> {
-        SearchWindow::about(&self.bounds, &self.region, view_size, demonstrations)
+        SearchWindow::about(&self.bounds, &self.region, view_size, demonstrations).map_err(|error| match error {
+            GraspError::Region(RegionError::SmallerThanPart { region, length, across }) => {
+                let [length, across] = [length, across].map(|in_view| in_view * self.picture_per_view);
+                RegionError::SmallerThanPart { region, length, across }.into()
+            }
+            error => error,
+        })
+    }
+}
+
+#[cfg(all(test, feature = "teach"))]
+mod tests {
+    use super::*;
+    use crate::drawn_part;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+    use sdg_geometry::PinholeCamera;
+
+    #[test]
+    fn a_region_that_is_too_small_is_compared_with_the_part_in_the_picture() {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let camera = PosedCamera {
+            intrinsics: PinholeCamera::WRIST,
+            world_from_camera: Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.55), down),
+        };
+        // 1000 pixels per metre in the picture, 2000 in the plan view.
+        let view = PlanView::of(&camera, 0.0, 2000.0, None, 6_000_000).unwrap();
+        let size = [view.width, view.height];
+        let taught = [TaughtDemonstration::new(&drawn_part::demonstration([320, 240])).unwrap()];
+        let region = RegionInPlanView::new(&SearchRegion::new([300, 200, 15, 10]), &camera, &view).unwrap();
+        let lengths = |window: Result<SearchWindow>| match window.unwrap_err() {
+            GraspError::Region(RegionError::SmallerThanPart { length, across, .. }) => [length, across],
+            error => panic!("{error}"),
+        };
+        let in_picture = lengths(region.window(size, &taught));
+        let in_view = lengths(SearchWindow::about(&region.bounds, &region.region, size, &taught));
+        for (picture, view) in in_picture.iter().zip(in_view) {
+            assert!((picture - 0.5 * view).abs() < 0.01 * view, "{picture} of {view}");
+        }
     }
 }

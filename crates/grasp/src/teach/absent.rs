@@ -10,6 +10,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use burn::tensor::read_sync;
 use image::{RgbImage, imageops};
 use sdg_demonstration::random::scramble;
 use sdg_demonstration::{
@@ -26,7 +27,9 @@ use crate::facts::NegativeFacts;
 use crate::model::{GraspModel, Verification};
 use crate::models::Network;
 use crate::models::candidate::PoseCandidate;
+use crate::plan_view::PlanViewDetector;
 use crate::region::SearchRegion;
+use crate::search_window::SearchWindow;
 use crate::taught::TaughtDemonstration;
 
 /// One sample in this many shows a picture without the part: fewer than the composed samples without it. Chosen by
@@ -54,11 +57,20 @@ pub struct AcceptedNegative {
     pub idx: usize,
     /// The best score in the picture.
     pub score: f64,
+    /// Whether scores could be reduced at all: the model accepts more than nine in ten held-out samples of the part.
+    pub has_room: bool,
 }
 
 impl fmt::Display for AcceptedNegative {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "still accepted with {:.2}: does it show the part?", self.score)
+        write!(f, "still accepted with {:.2}", self.score)?;
+        if self.has_room {
+            return f.write_str(": does it show the part?");
+        }
+        f.write_str(
+            ", because the model refuses one in ten or more of its own samples of the part, so that no score can be \
+             reduced: teach with further photos of the part",
+        )
     }
 }
 
@@ -70,8 +82,15 @@ pub(super) struct AbsentSamples {
 
 impl AbsentSamples {
     /// Resizes the pictures to the scale of their detection, at which the detector's rule resizes whole pictures.
-    /// Pictures smaller than frames of the samples' size are extended by the colours of their right and lower edges.
-    pub(super) fn new(pictures: &[RgbImage], [width, height]: [u32; 2], rule: ResizeRule, seed: u64) -> Self {
+    /// Only the window of each picture that `window_of` returns is used. Windows smaller than frames of the samples'
+    /// size are extended by the colours of their right and lower edges.
+    pub(super) fn new(
+        pictures: &[RgbImage],
+        window_of: impl Fn(&RgbImage) -> SearchWindow,
+        [width, height]: [u32; 2],
+        rule: ResizeRule,
+        seed: u64,
+    ) -> Self {
         // The detector resizes the samples as well.
         let of_frame = resized_size(rule, width, height);
         let as_detected = |picture: &RgbImage| {
@@ -86,6 +105,10 @@ impl AbsentSamples {
             } else {
                 imageops::resize(picture, wide, high, imageops::FilterType::Triangle)
             };
+            let window = window_of(picture).rect;
+            let [left, wide] = resized_span([window.left, window.width], picture.width(), wide);
+            let [top, high] = resized_span([window.top, window.height], picture.height(), high);
+            let resized = imageops::crop_imm(&resized, left, top, wide, high).to_image();
             if wide >= width && high >= height {
                 return resized;
             }
@@ -112,6 +135,27 @@ impl AbsentSamples {
     }
 }
 
+/// The first pixel and the length of a span `[from, length]` of `side` pixels that are resized to `resized` pixels.
+fn resized_span([from, length]: [u32; 2], side: u32, resized: u32) -> [u32; 2] {
+    let scale = f64::from(resized) / f64::from(side);
+    let first = ((f64::from(from) * scale) as u32).min(resized - 1);
+    let end = ((f64::from(from + length) * scale).ceil() as u32).clamp(first + 1, resized);
+    [first, end - first]
+}
+
+/// The part of a picture that is read if the region is searched. Plan views, and pictures that do not contain the
+/// region, are read whole.
+pub(super) fn window(
+    picture: &RgbImage,
+    options: &TeachOptions,
+    demonstrations: &[TaughtDemonstration],
+) -> SearchWindow {
+    let size = picture.dimensions().into();
+    let about = |region: SearchRegion| SearchWindow::about(&region.bounds(), &region, size, demonstrations).ok();
+    let region = region(options).filter(|region| region.check(size).is_ok());
+    region.and_then(about).unwrap_or_else(|| SearchWindow::whole(size))
+}
+
 /// The network's highest score in the searched region of each picture; 0 without a candidate. Plan views, and pictures
 /// that do not contain the region, count whole.
 ///
@@ -124,16 +168,22 @@ pub(super) fn highest_scores(
 ) -> Result<Vec<f64>> {
     let highest = |picture: &RgbImage| {
         let region = region(options).filter(|region| region.check(picture.dimensions().into()).is_ok());
+        let window = window(picture, options, demonstrations);
+        let whole_from_window = window.whole_from_window();
         let is_searched = |candidate: &&PoseCandidate| {
-            region.is_none_or(|region| region.has(&candidate.grasp.center(), &Polygon::from_box(&candidate.bbox)))
+            let center = whole_from_window.apply(&candidate.grasp.center());
+            let bounds = Polygon::from_box(&candidate.bbox).transformed(&whole_from_window);
+            region.is_none_or(|region| region.has(&center, &bounds))
         };
-        let proposals = network.proposals(picture, demonstrations)?;
+        let (cut, whole) = (window.cut(picture), picture.dimensions().into());
+        let proposals = read_sync(network.proposals_async(&cut, whole, demonstrations))?;
         Ok(proposals.candidates.iter().find(is_searched).map_or(0.0, |candidate| candidate.network_score))
     };
     options.negatives.iter().map(highest).collect()
 }
 
-/// The region of the pictures without the part. It is in pixels of the camera's pictures: plan views have none.
+/// The region of the pictures without the part; `None` for plan views, because it is in pixels of the camera's
+/// pictures.
 fn region(options: &TeachOptions) -> Option<SearchRegion> {
     options.region.filter(|_| options.lengths.is_none())
 }
@@ -152,22 +202,36 @@ pub(super) fn calibrated(
     // Pictures of a model with known lengths are plan views.
     let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
     let in_region = as_used.clone().with_region(region(options))?;
-    let best = |picture: &RgbImage| match best_log_odds(&in_region, picture, |_| true) {
-        // A picture that the region does not fit, such as one of another size, also counts whole.
-        Err(GraspError::Region(_)) => best_log_odds(&as_used, picture, |_| true),
-        best => best,
+    let in_plan_view = match (options.region, &options.over_table) {
+        (Some(region), Some(over_table)) if options.lengths.is_some() => {
+            Some(PlanViewDetector::new(model.clone().with_region(Some(region))?, over_table)?)
+        }
+        _ => None,
+    };
+    let best = |picture: &RgbImage| {
+        let size = <[u32; 2]>::from(picture.dimensions());
+        if let Some(detector) = in_plan_view.as_ref().filter(|detector| detector.view_size() == size) {
+            let found = detector.find_in_view(picture)?;
+            return Ok(highest_log_odds(found.iter().map(|found| found.detection.score)));
+        }
+        match best_log_odds(&in_region, picture, |_| true) {
+            // A picture that the region does not fit, such as one of another size, also counts whole.
+            Err(GraspError::Region(_)) => best_log_odds(&as_used, picture, |_| true),
+            best => best,
+        }
     };
     let absent = options.negatives.iter().map(best).collect::<Result<Vec<Option<f64>>>>()?;
     let scores: Vec<f64> = absent.iter().flatten().copied().collect();
-    let log_odds = if scores.iter().any(|score| score + MARGIN > 0.0) {
-        less_for(&scores, &on_parts(&as_used, demonstrations, options)?)
+    let (log_odds, has_room) = if scores.iter().any(|score| score + MARGIN > 0.0) {
+        let room = room(&on_parts(&as_used, demonstrations, options)?);
+        (less_for(&scores, room), room > 0.0)
     } else {
-        0.0
+        (0.0, true)
     };
     let reduced = absent.iter().enumerate().filter_map(|(idx, found)| Some((idx, (*found)? + log_odds)));
     let accepted: Vec<AcceptedNegative> = reduced
         .filter(|(_, log_odds)| *log_odds >= 0.0)
-        .map(|(idx, log_odds)| AcceptedNegative { idx, score: 1.0 / (1.0 + (-log_odds).exp()) })
+        .map(|(idx, log_odds)| AcceptedNegative { idx, score: 1.0 / (1.0 + (-log_odds).exp()), has_room })
         .collect();
     let facts = NegativeFacts { pictures: absent.len(), refused: absent.len() - accepted.len(), log_odds };
     let mut model = model.with_check(|check| check.score.bias += log_odds)?;
@@ -175,10 +239,15 @@ pub(super) fn calibrated(
     Ok((model, accepted))
 }
 
-/// The log-odds that reduce the scores without the part to below 0.5, limited so that all but the lowest tenth of the
-/// scores on the part stay above 0.5. Scores that this limit does not reduce to below 0.5 do not count.
-fn less_for(absent: &[f64], present: &[f64]) -> f64 {
-    let room = percentile(present.iter().copied(), REFUSED_PERCENT).unwrap_or(0.0).max(0.0);
+/// The log-odds by which scores may be reduced so that all but the lowest tenth of the scores on the part stay above
+/// 0.5.
+fn room(present: &[f64]) -> f64 {
+    percentile(present.iter().copied(), REFUSED_PERCENT).unwrap_or(0.0).max(0.0)
+}
+
+/// The log-odds that reduce the scores without the part to below 0.5, limited to `room`. Scores that this limit does
+/// not reduce to below 0.5 do not count.
+fn less_for(absent: &[f64], room: f64) -> f64 {
     let highest = absent.iter().copied().filter(|score| *score < room).fold(f64::NEG_INFINITY, f64::max);
     // Adding zero makes a negative zero positive.
     decimal(-(highest + MARGIN).clamp(0.0, room)) + 0.0
@@ -222,8 +291,11 @@ fn augmenter(
 /// The best score of the counted detections in a picture, in log-odds.
 fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&BoundingBox) -> bool) -> Result<Option<f64>> {
     let detections = model.detect(picture, Verification::ByShape)?;
-    let best = detections.iter().filter(|found| counts(&found.bbox)).map(|found| found.score).reduce(f64::max);
-    Ok(best.map(|score| (score / (1.0 - score)).ln()))
+    Ok(highest_log_odds(detections.iter().filter(|found| counts(&found.bbox)).map(|found| found.score)))
+}
+
+fn highest_log_odds(scores: impl Iterator<Item = f64>) -> Option<f64> {
+    scores.reduce(f64::max).map(|score| (score / (1.0 - score)).ln())
 }
 
 #[cfg(test)]
@@ -233,23 +305,28 @@ mod tests {
     use crate::drawn_part;
     use crate::facts::ModelKind;
     use crate::lengths::Lengths;
-    use crate::region::SearchRegion;
+    use crate::plan_view::{CameraOverTable, pictures_from_above, seen_from_above};
     use crate::teach::teach;
     use crate::teach::tests::demonstration;
     use burn::tensor::Device;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
     use sdg_detection::config::SizeRounding;
-    use sdg_geometry::PlanarSimilarity;
+    use sdg_geometry::{PinholeCamera, PlanarSimilarity, PosedCamera};
     use std::ops::ControlFlow;
+
+    fn whole(picture: &RgbImage) -> SearchWindow {
+        SearchWindow::whole(picture.dimensions().into())
+    }
 
     #[test]
     fn scores_are_lowered_below_a_half_but_not_at_the_cost_of_the_part() {
-        let present = [3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0];
-        assert!((less_for(&[0.4, 1.0], &present) + 1.2).abs() < 1e-9);
+        let room_of_part = room(&[3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0]);
+        assert!((less_for(&[0.4, 1.0], room_of_part) + 1.2).abs() < 1e-9);
         // With the margin, nine in ten samples are still accepted.
-        assert!((less_for(&[3.0], &present) + 3.1).abs() < 1e-9);
+        assert!((less_for(&[3.0], room_of_part) + 3.1).abs() < 1e-9);
         // A picture as similar to the part as the part itself would be accepted in any case, and reduces nothing.
-        assert!((less_for(&[9.0, 1.0], &present) + 1.2).abs() < 1e-9);
-        let none = [less_for(&[9.0], &present), less_for(&[-3.0], &present), less_for(&[1.0], &[])];
+        assert!((less_for(&[9.0, 1.0], room_of_part) + 1.2).abs() < 1e-9);
+        let none = [less_for(&[9.0], room_of_part), less_for(&[-3.0], room_of_part), less_for(&[1.0], room(&[]))];
         assert_eq!(none.map(f64::to_bits), [0.0_f64.to_bits(); 3]);
     }
 
@@ -260,7 +337,7 @@ mod tests {
             RgbImage::from_pixel(640, 480, image::Rgb([200, 0, 0])),
         ];
         let rule = ResizeRule::FitWithin { width_px: 160, height_px: 120 };
-        let absent = AbsentSamples::new(&pictures, [160, 120], rule, 5);
+        let absent = AbsentSamples::new(&pictures, whole, [160, 120], rule, 5);
         let drawn: Vec<(u64, Sample)> = (0..48).filter_map(|i| Some((i, absent.sample(i, [64, 48])?))).collect();
         assert_eq!(drawn.iter().map(|(i, _)| *i).collect::<Vec<_>>(), [11, 23, 35, 47]);
         for (i, (_, sample)) in drawn.iter().enumerate() {
@@ -268,7 +345,24 @@ mod tests {
             assert_eq!(sample.image.get_pixel(3, 3)[0], [9, 200][i % 2]);
             assert!(sample.objects.is_empty());
         }
-        assert_eq!(AbsentSamples::new(&[], [160, 120], rule, 5).sample(11, [64, 48]), None);
+        assert_eq!(AbsentSamples::new(&[], whole, [160, 120], rule, 5).sample(11, [64, 48]), None);
+    }
+
+    #[test]
+    fn beside_the_searched_window_a_picture_gives_no_samples() {
+        // Dark in the middle, where the window lies.
+        let picture = RgbImage::from_fn(640, 480, |x, y| {
+            image::Rgb([if (180..460).contains(&x) && (130..350).contains(&y) { 20 } else { 200 }; 3])
+        });
+        let rule = ResizeRule::FitWithin { width_px: 320, height_px: 240 };
+        let brightest = |window_of: fn(&RgbImage) -> SearchWindow| {
+            let absent = AbsentSamples::new(std::slice::from_ref(&picture), window_of, [320, 240], rule, 5);
+            let samples = (0..60).filter_map(|i| absent.sample(i, [96, 64]));
+            samples.flat_map(|sample| sample.image.into_raw()).max()
+        };
+        assert_eq!(brightest(whole), Some(200));
+        let middle = |picture: &RgbImage| SearchWindow::middle_of(picture.dimensions().into(), [240, 180]);
+        assert_eq!(brightest(middle), Some(20));
     }
 
     #[test]
@@ -276,7 +370,7 @@ mod tests {
         // Bright in its upper half.
         let picture = RgbImage::from_fn(1920, 1080, |_, y| image::Rgb([if y < 540 { 200 } else { 20 }; 3]));
         let bright_rows = |[width, height]: [u32; 2], rule: ResizeRule| {
-            let absent = AbsentSamples::new(std::slice::from_ref(&picture), [width, height], rule, 5);
+            let absent = AbsentSamples::new(std::slice::from_ref(&picture), whole, [width, height], rule, 5);
             let sample = absent.sample(11, [width, height]).unwrap().image;
             assert_eq!(sample.dimensions(), (width, height));
             (0..height).filter(|&y| sample.get_pixel(100, y)[0] > 128).count()
@@ -345,7 +439,7 @@ mod tests {
         let after = teach_s(&options);
         let facts = after.model.facts().negatives.unwrap();
         assert_eq!(facts, NegativeFacts { pictures: 2, refused: 1, log_odds: 0.0 });
-        let [AcceptedNegative { idx: 0, score: nearly_score }] = after.accepted_negatives[..] else {
+        let [AcceptedNegative { idx: 0, score: nearly_score, has_room: true }] = after.accepted_negatives[..] else {
             panic!("{:?}", after.accepted_negatives)
         };
         assert!(nearly_score > 0.9, "{nearly_score}");
@@ -356,6 +450,49 @@ mod tests {
         let facts = after.model.facts().negatives.unwrap();
         assert_eq!(facts, NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 });
         assert!(after.accepted_negatives.is_empty());
+    }
+
+    #[test]
+    fn a_model_that_refuses_many_parts_is_named_as_the_cause() {
+        let demonstrations = [demonstration()];
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        let model = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        let mut nearly = demonstrations[0].image.clone();
+        nearly.put_pixel(0, 0, image::Rgb([0, 0, 0]));
+        // In the photo itself, the part is just accepted.
+        let in_photo = best_log_odds(&model, &nearly, |_| true).unwrap().unwrap();
+        let weak = model.with_check(|check| check.score.bias -= in_photo - 0.1).unwrap();
+        options.negatives = vec![nearly];
+        let (_, accepted) = calibrated(weak, &demonstrations, &options).unwrap();
+        let [negative @ AcceptedNegative { idx: 0, has_room: false, .. }] = accepted[..] else {
+            panic!("{accepted:?}")
+        };
+        let told = negative.to_string();
+        assert!(told.starts_with("still accepted with 0.52, because the model refuses one in ten or more"), "{told}");
+    }
+
+    #[test]
+    fn only_the_searched_region_of_a_calibrated_camera_counts() {
+        let intrinsics = PinholeCamera::WRIST;
+        let size = [intrinsics.width, intrinsics.height];
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let world_from_camera = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), down);
+        let camera = PosedCamera { intrinsics, world_from_camera };
+        let over_table = CameraOverTable { camera, table_height_m: 0.0, workspace: None };
+        let photo = drawn_part::demonstration(size);
+        let (demonstrations, lengths) = seen_from_above(&[photo], &over_table, 0.0, 0.0).unwrap();
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        options.region = Some(SearchRegion::new([0, 0, 300, 240]).of_picture(size));
+        options.over_table = Some(over_table);
+        let beside = drawn_part::picture(size, &[drawn_part::at(500.0, 380.0, 20.0)]);
+        options.negatives = pictures_from_above(&[beside], &over_table, &lengths).unwrap();
+        options.lengths = Some(lengths);
+        let taught = teach(&demonstrations, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+        let expected = NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 };
+        assert_eq!(taught.model.facts().negatives, Some(expected));
+        assert!(taught.accepted_negatives.is_empty());
     }
 
     #[test]

@@ -279,7 +279,9 @@ pub(crate) fn teach_network(
     let recurring = |i: u64| teaching.distinct_samples.map_or(i, |distinct| i % distinct);
     let windows = augmenter.windows(teaching.detector.network.input.size_divisibility as u32);
     let resize_rule = teaching.detector.network.input.resize;
-    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), resize_rule, options.seed);
+    let window_of = |picture: &RgbImage| absent::window(picture, options, &taught);
+    let frame_size = augmenter.output_size();
+    let absent = AbsentSamples::new(&options.negatives, window_of, frame_size, resize_rule, options.seed);
     let source = SampleSource {
         frames: &|i| {
             let whole = || absent.sample(i, augmenter.output_size());

@@ -15,6 +15,7 @@ use crate::check_config::CheckConfig;
 use crate::error::Result;
 use crate::facts::ModelKind;
 use crate::lengths::Lengths;
+use crate::plan_view::CameraOverTable;
 use crate::region::SearchRegion;
 
 /// The options of teaching.
@@ -38,11 +39,13 @@ pub struct TeachOptions {
     pub symmetry: RotationalSymmetry,
     /// Range of sizes, relative to the nominal one, at which the part is searched.
     pub size_tolerance: RangeInclusive<f64>,
-    /// The region of pictures that the model searches. In teaching, it restricts only the calibration of the score with
-    /// `negatives`.
+    /// The region of pictures that the model searches. In teaching, it restricts only the use of `negatives`.
     pub region: Option<SearchRegion>,
     /// The lengths returned by [`crate::seen_from_above`], if it made the demonstrations.
     pub lengths: Option<Lengths>,
+    /// The camera of which `negatives` are plan views, made by [`crate::pictures_from_above`]. Without it, `region` has
+    /// no effect on plan views.
+    pub over_table: Option<CameraOverTable>,
     /// The user's pictures without the part: some of a network's samples, and data for the score's calibration. Each
     /// picture counts once, and none is used as a background of other samples.
     pub negatives: Vec<RgbImage>,
@@ -66,6 +69,7 @@ impl TeachOptions {
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             region: None,
             lengths: None,
+            over_table: None,
             negatives: Vec::new(),
             start: Start::default(),
             device: Device::flex(),

@@ -6,10 +6,11 @@ use std::time::Duration;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
-use sdg_geometry::{GraspLine, PlanarSimilarity, Polygon};
+use sdg_geometry::{Angle, GraspLine, PlanarSimilarity, Polygon};
 
 use super::*;
 use crate::drawn_part::{self, at, line};
+use crate::model::{GraspModel, Verification};
 use crate::region::SearchRegion;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -243,6 +244,91 @@ fn a_part_that_lies_still_stays_where_the_search_has_it() {
     // A movement of one pixel is followed.
     let moved = tracker.frame(Arc::new(picture(&[at(101.3, 90.8, 17.0)])), Duration::from_millis(1200));
     assert_at(&moved[0], &at(101.3, 90.8, 17.0), "moved");
+}
+
+/// The log-odds of a score.
+fn log_odds(score: f64) -> f64 {
+    (score / (1.0 - score)).ln()
+}
+
+/// The drawn part's model with all scores changed by these log-odds.
+fn model_with_bias(log_odds: f64) -> GraspModel {
+    drawn_part::model(SIZE).with_check(|check| check.score.bias += log_odds).unwrap()
+}
+
+/// Under a slanted camera, a search rectifies the picture and accepts a part, although the part has too little evidence
+/// in the picture itself.
+#[test]
+fn a_part_that_only_the_search_accepts_is_followed() {
+    let pose = at(150.0, 110.0, 30.0);
+    let [empty, with_part] = [vec![], vec![pose]].map(|parts| Arc::new(picture(&parts)));
+    let seen = drawn_part::model(SIZE).detect(&with_part, Verification::ByShape).unwrap();
+    // In the picture itself, the score is 0.12.
+    let model = model_with_bias(-2.0 - log_odds(seen[0].score));
+    // The search as if in the rectified picture, where the score is 0.95.
+    let searched = |search: PartSearch| {
+        let mut outcome = search.run();
+        let best = &mut outcome.found.as_mut().unwrap()[0].detection;
+        assert!(!best.is_accepted());
+        best.score = 0.95;
+        best.evidence.as_mut().unwrap().likeness += 2.0 + log_odds(0.95);
+        outcome
+    };
+    let new_tracker = || Tracker::new(model.clone().into(), TrackerConfig::default());
+    // Searched before the answer, because the picture has changed.
+    let mut tracker = new_tracker();
+    tracker.frame(Arc::clone(&empty), Duration::ZERO);
+    let search = tracker.search_before_answer().unwrap();
+    assert!(tracker.answer(search.run()).unwrap().is_empty());
+    tracker.frame(Arc::clone(&with_part), Duration::from_millis(100));
+    let search = tracker.search_before_answer().unwrap();
+    let parts = tracker.answer(searched(search)).unwrap();
+    assert_eq!((parts.len(), parts[0].detection.score), (1, 0.95));
+    // Searched while further frames arrive.
+    let mut tracker = new_tracker();
+    tracker.frame(Arc::clone(&with_part), Duration::ZERO);
+    let search = tracker.search_due().unwrap();
+    tracker.take_outcome(searched(search)).unwrap();
+    for number in 1..4 {
+        let parts = tracker.frame(Arc::clone(&with_part), PERIOD * number);
+        assert_eq!((parts.len(), parts[0].detection.score), (1, 0.95), "frame {number}");
+        assert_at(&parts[0], &pose, &format!("frame {number}"));
+    }
+}
+
+/// An object that resembles the part but has another size is tracked until the part lies beside it. Each search then
+/// accepts only the surer one of the two.
+#[test]
+fn a_refused_object_is_no_reference_for_the_size_of_the_part() {
+    let larger = PlanarSimilarity::about(Point2::new(90.0, 70.0), Point2::new(225.0, 140.0), Angle::ZERO, 1.2);
+    let poses = [at(80.0, 80.0, 0.0), larger];
+    let found = drawn_part::model(SIZE).detect(&picture(&poses), Verification::ByShape).unwrap();
+    let nearest = |pose: &PlanarSimilarity| {
+        let off = |found: &&GraspDetection| (found.grasp.center() - line().transformed(pose).center()).norm();
+        found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
+    };
+    let sizes = poses.each_ref().map(|pose| nearest(pose).evidence.unwrap().size);
+    assert!(sizes.contains(&0.0) && sizes.iter().any(|size| *size < -2.0), "{sizes:?}");
+    let [part, other] = if sizes[0] == 0.0 { poses } else { [poses[1], poses[0]] };
+    // Alone, the other object is just accepted.
+    let seen = nearest(&other);
+    let model = model_with_bias(0.5 + seen.evidence.unwrap().size - log_odds(seen.score));
+    let assert_part_alone = |parts: &[TrackedPart]| {
+        let followed: Vec<_> = parts.iter().filter(|part| part.is_followed()).collect();
+        assert_eq!(followed.len(), 1, "{parts:?}");
+        assert_at(followed[0], &part, "the surer one");
+    };
+    // At 10 pictures per second, the changed picture is searched before it is answered.
+    let mut tracker = Tracker::new(model.clone().into(), TrackerConfig::default());
+    let frames = [vec![other], vec![part, other], vec![part, other]];
+    let answers = run_searching_before_answers(&mut tracker, Duration::from_millis(100), &frames);
+    assert_at(&answers[0].1[0], &other, "alone");
+    answers[1..].iter().for_each(|(_, parts)| assert_part_alone(parts));
+    // At 100 pictures per second, the search ends some frames later.
+    let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
+    let all = run(&mut tracker, 45, |number| if number < 12 { vec![other] } else { vec![part, other] });
+    assert_at(&all[11][0], &other, "alone");
+    assert_part_alone(&all[44]);
 }
 
 /// A search finds a part with another photo than its track, from which its pose differs by the difference of the photos.

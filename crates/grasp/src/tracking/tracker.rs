@@ -18,7 +18,7 @@ use crate::detection::{Found, GraspDetection};
 use crate::error::Result;
 use crate::model::are_of_same_part;
 use crate::plan_view::PlanarPose;
-use crate::verdict::Clues;
+use crate::verdict::{Clues, Contributions};
 use sdg_shape::PixelRect;
 
 /// Minimum score for a detection to become a track, and for a lost track to be found again: the acceptance threshold.
@@ -89,6 +89,17 @@ struct Tracked {
     part: TrackedPart,
     /// Whether the part was lost in the frame before the newest, as returned to the caller.
     was_lost: bool,
+    in_search: InSearch,
+}
+
+/// A track's part in the newest finished search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum InSearch {
+    Accepted,
+    /// The search refused the part only because a surer part of the picture has another size.
+    RefusedBySize,
+    /// The search did not find the part, or refused it for another reason.
+    Unknown,
 }
 
 /// The reported data of a track.
@@ -171,6 +182,7 @@ impl Tracker {
         let gap = self.gap.take();
         let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(self.parts()) };
         let mut found = outcome.found?;
+        self.compare_with_search(&found, frame.number);
         found.retain(|found| found.detection.is_accepted());
         found.truncate(self.config.max_parts);
         let mut arrived: Vec<_> = found.iter().filter_map(|found| self.arrived(&frame, found)).collect();
@@ -182,7 +194,10 @@ impl Tracker {
                 })
                 .collect();
             let judged = self.detector.model().judge_in_sequence(&clues, &self.log_sizes());
-            let mut is_accepted = judged.iter().map(|(score, _)| *score >= ACCEPTED);
+            let verdicts = arrived.iter().zip(judged).map(|((track, Refined { followed, .. }, _), judged)| {
+                self.verdict_on_arrived(track, followed, judged)
+            });
+            let mut is_accepted = verdicts.map(|(score, _)| score >= ACCEPTED).collect::<Vec<_>>().into_iter();
             arrived.retain(|_| is_accepted.next() == Some(true));
         }
         let is_found = |id: u64| arrived.iter().any(|(track, ..)| track.replaces() == Some(id));
@@ -209,10 +224,53 @@ impl Tracker {
         Some((track, Refined { followed, close }, shown))
     }
 
-    /// The reference sizes by demonstration, the oldest track's first: parts of one sequence have one size, like parts of
-    /// one picture, so that a look-alike of another size is not a lost part.
+    /// The reference sizes by demonstration, first that of the surest followed track, then those of lost tracks, the
+    /// last lost first: parts of one sequence have one size, like parts of one picture, so that a look-alike of another
+    /// size is not a lost part. Tracks that the newest search refused because of their size are left out.
     fn log_sizes(&self) -> Vec<(usize, f64)> {
-        self.tracks.iter().map(|tracked| (tracked.track.demonstration_idx(), tracked.track.log_size())).collect()
+        let is_reference = |tracked: &&Tracked| tracked.in_search != InSearch::RefusedBySize;
+        let mut references: Vec<&Tracked> = self.tracks.iter().filter(is_reference).collect();
+        references.sort_by(|a, b| {
+            let by_score = b.part.detection.score.total_cmp(&a.part.detection.score);
+            b.track.number.cmp(&a.track.number).then(by_score)
+        });
+        references.iter().map(|tracked| (tracked.track.demonstration_idx(), tracked.track.log_size())).collect()
+    }
+
+    /// Notes for each track whether a search of frame `number` accepted its part.
+    fn compare_with_search(&mut self, all_found: &[Found], number: u64) {
+        self.tracks.iter_mut().for_each(|tracked| tracked.in_search = InSearch::Unknown);
+        // The best detection comes first.
+        for found in all_found {
+            let Some((idx, ..)) = self.matched(found, number) else { continue };
+            if self.tracks[idx].in_search != InSearch::Unknown {
+                continue;
+            }
+            let without_size = |evidence| self.detector.model().verdict_with_size(evidence, 0.0).0;
+            if found.detection.is_accepted() {
+                self.tracks[idx].in_search = InSearch::Accepted;
+            } else if found.detection.evidence.map(without_size).is_some_and(|score| score >= ACCEPTED) {
+                self.tracks[idx].in_search = InSearch::RefusedBySize;
+            }
+        }
+    }
+
+    /// The verdict on an arrived track, given the verdict `judged` in the newest frame. A held track has the verdict of
+    /// the search, which may have rectified the picture of a slanted camera. The search compared the part's size with
+    /// the sizes of the parts that it found. If no track is among them, the size counts as in `judged`.
+    fn verdict_on_arrived(
+        &self,
+        track: &Track,
+        followed: &Followed,
+        judged: (f64, Contributions),
+    ) -> (f64, Contributions) {
+        let Some((score, evidence)) = track.held_verdict(followed) else { return judged };
+        let of_photo = |tracked: &&Tracked| tracked.track.demonstration_idx() == track.demonstration_idx();
+        let in_search: Vec<InSearch> = self.tracks.iter().filter(of_photo).map(|tracked| tracked.in_search).collect();
+        if in_search.contains(&InSearch::Accepted) || !in_search.contains(&InSearch::Unknown) {
+            return (score, evidence);
+        }
+        self.detector.model().verdict_with_size(evidence, judged.1.size)
     }
 
     fn parts(&self) -> Vec<TrackedPart> {
@@ -295,6 +353,7 @@ impl Tracker {
         self.searching = None;
         let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(()) };
         let all_found = outcome.found?;
+        self.compare_with_search(&all_found, frame.number);
         // This search has the parts of the earlier one in a newer frame.
         self.arriving.clear();
         let num_followed = self.tracks.iter().filter(|tracked| tracked.part.is_followed()).count();
@@ -424,7 +483,10 @@ impl Tracker {
             }
         }
         for ((track, refined), verdict) in arrived.into_iter().zip(&newcomers).zip(of_newcomers) {
-            let seen = refined.as_ref().zip(verdict).filter(|(_, (score, _))| *score >= ACCEPTED);
+            let verdict = refined.as_ref().zip(verdict);
+            let seen = verdict
+                .map(|(refined, judged)| (refined, self.verdict_on_arrived(&track, &refined.followed, judged)))
+                .filter(|(_, (score, _))| *score >= ACCEPTED);
             let shown = seen.and_then(|(refined, verdict)| Some((refined, output(&track, refined, verdict, size)?)));
             if let Some((refined, shown)) = shown {
                 self.enter(track, &refined.followed, number, captured, shown);
@@ -461,7 +523,7 @@ impl Tracker {
             let age = captured.saturating_sub(track.first_seen);
             let unseen_for = Duration::ZERO;
             let part = TrackedPart { id: track.id, state: TrackState::Followed, age, unseen_for, detection, pose };
-            self.tracks.push(Tracked { track, part, was_lost: false });
+            self.tracks.push(Tracked { track, part, was_lost: false, in_search: InSearch::Accepted });
         }
     }
 
@@ -524,6 +586,7 @@ impl Tracked {
     /// Continues from another track's pose of the same part.
     fn go_on_as(&mut self, other: Track, captured: Duration, shown: Shown) {
         self.track.replace_by(other);
+        self.in_search = InSearch::Accepted;
         self.show(captured, shown);
     }
 }

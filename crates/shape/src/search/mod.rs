@@ -76,6 +76,8 @@ impl SearchConfig {
     pub const DEFAULT_NUM_POINTS: usize = 64;
     /// The value of [`Default`] for [`max_starts`](Self::max_starts): about a hundred per scale. Chosen by hand.
     pub const DEFAULT_MAX_STARTS: usize = 1024;
+    /// The largest value of [`max_starts`](Self::max_starts). Chosen by hand.
+    pub const LARGEST_MAX_STARTS: usize = 4096;
     /// Bounds of [`scales`](Self::scales); outside them the part at the swept level is too small or too large. Chosen by
     /// hand, not measured.
     pub const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
@@ -135,7 +137,7 @@ const MIN_SWEEP_POINTS: usize = 32;
 /// the sweep's 16-bit sums. The upper bound is derived, the lower one chosen by hand.
 const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
 /// Bounds of [`SearchConfig::max_starts`]. Chosen by hand.
-const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
+const MAX_STARTS_BOUNDS: (usize, usize) = (8, SearchConfig::LARGEST_MAX_STARTS);
 /// Starts that are climbed together. Chosen by hand to save time.
 const STARTS_AT_ONCE: usize = 64;
 /// Climbed starts that are followed to full resolution together. Chosen by hand to save time.
@@ -261,8 +263,9 @@ impl ShapeSearch {
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
-        let area = self.screen.as_ref().and_then(|screen| screen.area(field, &responses, MIN_RESPONSE));
-        let starts = sweep(&responses, &self.bank, area.as_ref(), self.config.max_starts, MIN_RESPONSE);
+        let max_starts = self.config.max_starts;
+        let area = self.screen.as_ref().and_then(|screen| screen.area(field, &responses, max_starts, MIN_RESPONSE));
+        let starts = sweep(&responses, &self.bank, area.as_ref(), max_starts, MIN_RESPONSE);
         let best = self.apart(self.follow_best(picture, starts));
         let polished = self.polish(picture, best);
         let mut matches = self.apart(polished);

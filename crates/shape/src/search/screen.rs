@@ -14,9 +14,11 @@ use crate::search::sweep::{Area, sweep};
 const MIN_PLACES: usize = 1 << 18;
 /// Minimum number of edge points at the coarser level. Chosen by hand.
 const MIN_POINTS: usize = 24;
-/// Number of places of the coarser level about which the picture is swept. With 128 places, 13 of 130 parts in mosaics
-/// of photographs were lost; with 256, one.
-const MAX_STARTS: usize = 256;
+/// Minimum number of places of the coarser level about which the picture is swept. With 128 places, 13 of 130 parts in
+/// mosaics of photographs were lost; with 256, one.
+const MIN_SWEPT_PLACES: usize = 256;
+/// Number of starts for each of these places, as with the default number of starts. More starts are for more parts.
+const STARTS_PER_PLACE: usize = 4;
 /// How far the swept places extend around a place of the coarser level, in swept places: three places of that level.
 /// Chosen by hand.
 const RADIUS: usize = 6;
@@ -35,14 +37,21 @@ impl Screen {
         (points.len() >= MIN_POINTS).then(|| Self { bank: bank(), level_idx })
     }
 
-    /// The places to sweep; `None` for a small picture, which is swept everywhere.
-    pub(crate) fn area(&self, field: &GradientField, responses: &Responses, min_response: f64) -> Option<Area> {
+    /// The places to sweep for `max_starts` starts; `None` for a small picture, which is swept everywhere.
+    pub(crate) fn area(
+        &self,
+        field: &GradientField,
+        responses: &Responses,
+        max_starts: usize,
+        min_response: f64,
+    ) -> Option<Area> {
         if responses.width * responses.height < MIN_PLACES || self.level_idx >= field.num_levels() {
             return None;
         }
         let coarse = Responses::new(field.level(self.level_idx), self.bank.reach);
         let mut area = Area::none_of(responses);
-        for start in sweep(&coarse, &self.bank, None, MAX_STARTS, min_response) {
+        let num_places = (max_starts / STARTS_PER_PLACE).max(MIN_SWEPT_PLACES);
+        for start in sweep(&coarse, &self.bank, None, num_places, min_response) {
             area.add(responses, start.place.map(|at| 2 * at), RADIUS);
         }
         Some(area)

@@ -64,7 +64,8 @@ fn a_screened_picture_shows_the_same_parts() {
     });
     let field = GradientField::new(&large);
     let responses = Responses::new(field.level(search.sweep_level_idx), search.bank.reach);
-    let area = search.screen.as_ref().unwrap().area(&field, &responses, MIN_RESPONSE).unwrap();
+    let screen = search.screen.as_ref().unwrap();
+    let area = screen.area(&field, &responses, config.max_starts, MIN_RESPONSE).unwrap();
     let share = area.share();
     assert!((0.02..0.6).contains(&share), "{share} of the places are swept");
 
