@@ -1,6 +1,6 @@
 // Requests to the server. Errors are one line of text for the user.
 
-/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. */
+/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. `image`: the server's view of a photo whose marks another program has changed. */
 export class RequestError extends Error {
   constructor(message, lost = false) {
     super(message);
@@ -55,12 +55,13 @@ async function send(method, path, body, options = {}) {
   if (response.status === 413) throw new RequestError(`${body?.name ?? "That"} is too large.`);
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
+  let image;
   try {
-    message = JSON.parse(text).error ?? message;
+    ({ error: message = message, image } = JSON.parse(text));
   } catch {
     // Refusals by the guard are plain text.
   }
-  throw new RequestError(message);
+  throw Object.assign(new RequestError(message), { image });
 }
 
 /** One detection at a time: each uses all cores. */

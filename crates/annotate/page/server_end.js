@@ -17,7 +17,7 @@ const RETRY_MS = 1500;
 /** The key of this project's waiting marks in the browser's storage. */
 const keptKey = () => `kept-marks:${state.project}`;
 
-const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
+const isUnsaved = ({ saving, saved }) => saving || saved.state === "refused";
 
 /** The waiting marks of all tabs by the photos' keys, and the keys of those that this tab has stored. */
 const kept = () => JSON.parse(stored(keptKey()) ?? "{}");
@@ -90,8 +90,9 @@ async function meetAgain() {
     }
     return [pairs.filter(([, view]) => view).map(([entry]) => entry), further];
   };
-  const [images, newImages] = adoptNumbers(state.images, session.images, (known, { id, advice, saved }) => {
-    Object.assign(known, isUnsaved(known) ? { id } : { id, advice, saved });
+  const [images, newImages] = adoptNumbers(state.images, session.images, (known, view) => {
+    known.id = view.id;
+    if (!isUnsaved(known)) adoptChange(known, view);
   });
   const [trials, newTrials] = adoptNumbers(state.trialPictures, session.trial_pictures, Object.assign);
   const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
@@ -104,6 +105,8 @@ async function meetAgain() {
   state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
   belongTo(session);
   setLost(false);
+  // The server knows none of the marks that were refused.
+  state.images.filter(isUnsaved).forEach(save);
   sendKept();
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
   if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
@@ -124,7 +127,7 @@ export async function sendKept() {
     if (textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
     target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
-    sent.push(save(target).then(() => target.saved.state === "written"));
+    sent.push(save(target).then(() => target.saved.state === "written" && target.marks === marks));
   }
   const count = (await Promise.all(sent)).filter(Boolean).length;
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
@@ -142,7 +145,7 @@ async function adoptChanges() {
   adoptModels(session);
   for (const [target, revision] of before) {
     const view = session.images.find(({ id }) => id === target.id);
-    if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
+    if (view && revision === target.revision && !target.saving) adoptChange(target, view);
   }
   keep();
   changed();
