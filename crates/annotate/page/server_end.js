@@ -2,10 +2,10 @@
 // back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
-import { adopt, adoptChange, save, textOf } from "./editing.js";
+import { adoptChange, save, textOf } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
-import { adoptModels, changed, state } from "./store.js";
-import { showCurrent } from "./strip.js";
+import { changed, state } from "./store.js";
+import { adoptSession, showCurrent } from "./strip.js";
 import { follow } from "./teach.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
@@ -58,16 +58,6 @@ onLoss((lost) => {
   } else toast("sdg annotate answers again.");
 });
 
-/** Pairs each entry of `known` with the one in `views` of the same name; equal names are paired in order. */
-function pairsByName(known, views) {
-  const left = [...views];
-  const pairs = known.map((entry) => {
-    const at = left.findIndex((view) => view.name === entry.name);
-    return [entry, at < 0 ? null : left.splice(at, 1)[0]];
-  });
-  return { pairs, further: left };
-}
-
 /** Adopts the numbers of a restarted server, if there is one; then waiting marks are sent. */
 async function meetAgain() {
   let session;
@@ -77,30 +67,26 @@ async function meetAgain() {
     // The next check tries again.
     return;
   }
-  // The server was started without this project: waiting marks are kept and sent when it is opened again.
-  if (session.start || session.project !== state.project) return location.reload();
+  // The server was started without this project: waiting marks are kept and sent when it is opened again. After a start with another camera or name, the page is loaded anew.
+  const settings = ({ project, camera, label }, isCalibrated) => String([project, camera, label, isCalibrated]);
+  if (session.start || settings(session, session.is_calibrated) !== settings(state, state.isCalibrated)) return location.reload();
   // Another call of this function was faster.
   if (!isLost()) return;
   const gone = [];
-  const adoptNumbers = (entries, views, take) => {
-    const { pairs, further } = pairsByName(entries, views);
-    for (const [entry, view] of pairs) {
-      if (view) take(entry, view);
-      else gone.push(Object.assign(entry, { isGone: true }).name);
-    }
-    return [pairs.filter(([, view]) => view).map(([entry]) => entry), further];
-  };
-  const [images, newImages] = adoptNumbers(state.images, session.images, (known, view) => {
+  // The entries that are in `views`, by name; equal names are paired in order.
+  const renumbered = (entries, [...views], take) => entries.filter((entry) => {
+    const at = views.findIndex(({ name }) => name === entry.name);
+    if (at < 0) gone.push(Object.assign(entry, { isGone: true }).name);
+    else take(entry, views.splice(at, 1)[0]);
+    return at >= 0;
+  });
+  const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
+  state.images = renumbered(state.images, session.images, (known, view) => {
     known.id = view.id;
     if (!isUnsaved(known)) adoptChange(known, view);
   });
-  const [trials, newTrials] = adoptNumbers(state.trialPictures, session.trial_pictures, Object.assign);
-  const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
-  Object.assign(state, {
-    images: [...images, ...newImages.map(adopt)],
-    trialPictures: [...trials, ...newTrials.map((view) => ({ ...view, detections: null }))],
-  });
-  adoptModels(session);
+  state.trialPictures = renumbered(state.trialPictures, session.trial_pictures, Object.assign);
+  adoptSession(session);
   state.current = Math.max(state.images.indexOf(shown), 0);
   state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
   belongTo(session);
@@ -135,20 +121,21 @@ export async function sendKept() {
 
 window.addEventListener("pagehide", keep);
 
-/** Adopts marks that another page of the session has changed (the next change here would write over them), and its choice of model and region. */
+/** Adopts marks that another page of the session has changed (the next change here would write over them), its further pictures, and its choice of model and region. */
 async function adoptChanges() {
   if (isLost() || document.hidden) return;
   const before = state.images.map((target) => [target, target.revision]);
   // If the server is gone, a banner says so.
   const session = await api.session().catch(() => null);
   if (!session) return;
-  adoptModels(session);
+  adoptSession(session);
   for (const [target, revision] of before) {
     const view = session.images.find(({ id }) => id === target.id);
     if (view && revision === target.revision && !target.saving) adoptChange(target, view);
   }
   keep();
-  changed();
+  // The stage shows the first picture of a page that had none.
+  (by("photo").hidden ? showCurrent : changed)();
 }
 for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);
 

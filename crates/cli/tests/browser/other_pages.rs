@@ -1,4 +1,4 @@
-//! Marks that another program changes meanwhile, and marks that the server refuses.
+//! Marks and pictures that another program or another page changes meanwhile, and marks that the server refuses.
 
 use serde_json::{Value, json};
 
@@ -84,4 +84,32 @@ fn refused_marks_are_kept_and_sent_again_but_invalid_ones_only_to_another_server
     page.wait_for("a check of the server", check);
     assert!(page.text("#saved").starts_with("Not saved"), "{}", page.text("#saved"));
     assert_eq!(annotation(&file).outline, before);
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn pictures_that_another_page_added_are_shown_and_a_restored_photo_only_once() {
+    let page = open(&[], &["earlier", "photo"]);
+    // Requests of another page; then this one is used again.
+    let ask = |script: &str| {
+        let script =
+            format!("return {script}.then((answer) => {{ dispatchEvent(new Event('focus')); return answer.ok; }})");
+        assert_eq!(page.browser.run(&script, &[]).unwrap(), json!(true));
+    };
+    let row = "return [...document.querySelectorAll('#strip button')].map((b) => b.children[1].innerText).join()";
+    ask("fetch('/api/images/0/picture').then((answer) => answer.blob())
+        .then((body) => fetch('/api/trial-pictures?name=tried.png', { method: 'POST', body }))");
+    page.click("#tab-try");
+    page.wait_for("the picture to try", &format!("{row} === 'tried.png'"));
+    page.click("#tab-mark");
+    page.click("#remove-photo");
+    page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
+    wait_for_note(&page, "is removed");
+    ask("fetch('/api/images/0/put-back', { method: 'POST' })");
+    page.wait_for("the removed photo", &format!("{row} === 'photo.png,earlier.png'"));
+    page.click("#toasts button");
+    page.wait_for("it on the stage", "return document.getElementById('photo').alt === 'Photo earlier.png'");
+    page.settle_frames();
+    assert_eq!(page.browser.run(row, &[]).unwrap(), json!("photo.png,earlier.png"));
+    page.assert_quiet();
 }
