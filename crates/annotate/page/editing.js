@@ -2,7 +2,7 @@
 
 import { api, isLost, present } from "./api.js";
 import { wait } from "./elements.js";
-import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, nearestWithin, norm, placedAt, sub } from "./geometry.js";
+import { areaOf, boundsOf, clamp, graspOf, gripperOf, isWithin, nearestWithin, norm, placedAt, sub } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
@@ -143,8 +143,10 @@ export function boxDrawn() {
 }
 
 export function placeGripper(point) {
-  const part = region() ?? boxPolygon([0, 0, ...size()]);
-  setGripper(placedAt(point, part));
+  const part = region();
+  // Without a box, the size of the part is not known.
+  const width = Math.max(...size()) / 9;
+  setGripper(part ? placedAt(point, part) : { center: point, angle: 0, length: width, width });
   image().placed = { point, grasp: JSON.stringify(marks().grasp, round) };
   Object.assign(state, { selected: "grasp", tool: "select" });
   commit();
