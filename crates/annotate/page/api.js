@@ -64,7 +64,7 @@ async function send(method, path, body, options = {}) {
   throw Object.assign(new RequestError(message), { image });
 }
 
-/** One detection at a time: each uses all cores. */
+/** One detection at a time: each uses all cores. A comparison, which can take minutes, does not delay the live picture. */
 let lastDetection = Promise.resolve();
 const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
@@ -105,7 +105,7 @@ export const api = {
   putBackTrialPicture: (id) => send("POST", `/api/trial-pictures/${id}/put-back`),
   setAbsent: (id, absent) => json("PUT", `/api/trial-pictures/${id}/absent`, { absent }),
   useModel: (id) => send("PUT", `/api/models/${id}/current`),
-  compareModels: (one, other) => inTurn(() => send("POST", `/api/models/${one}/compare/${other}`)),
+  compareModels: (one, other) => send("POST", `/api/models/${one}/compare/${other}`),
   imageUrl: (id) => pictureUrl("images", id),
   sampleUrl: (id, index, seed, revision) => `/api/images/${id}/samples/${index}?seed=${seed}&revision=${revision}&${sessionId}`,
   teach: (request) => json("POST", "/api/teaching", request),
