@@ -1,6 +1,6 @@
 // Requests to the server. Errors are one line of text for the user.
 
-/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. */
+/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. `image`: the server's view of a photo whose marks another program has changed. */
 export class RequestError extends Error {
   constructor(message, lost = false) {
     super(message);
@@ -55,15 +55,16 @@ async function send(method, path, body, options = {}) {
   if (response.status === 413) throw new RequestError(`${body?.name ?? "That"} is too large.`);
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
+  let image;
   try {
-    message = JSON.parse(text).error ?? message;
+    ({ error: message = message, image } = JSON.parse(text));
   } catch {
     // Refusals by the guard are plain text.
   }
-  throw new RequestError(message);
+  throw Object.assign(new RequestError(message), { image });
 }
 
-/** One detection at a time: each uses all cores. */
+/** One detection at a time: each uses all cores. A comparison, which can take minutes, does not delay the live picture. */
 let lastDetection = Promise.resolve();
 const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
@@ -104,7 +105,7 @@ export const api = {
   putBackTrialPicture: (id) => send("POST", `/api/trial-pictures/${id}/put-back`),
   setAbsent: (id, absent) => json("PUT", `/api/trial-pictures/${id}/absent`, { absent }),
   useModel: (id) => send("PUT", `/api/models/${id}/current`),
-  compareModels: (one, other) => inTurn(() => send("POST", `/api/models/${one}/compare/${other}`)),
+  compareModels: (one, other) => send("POST", `/api/models/${one}/compare/${other}`),
   imageUrl: (id) => pictureUrl("images", id),
   sampleUrl: (id, index, seed, revision) => `/api/images/${id}/samples/${index}?seed=${seed}&revision=${revision}&${sessionId}`,
   teach: (request) => json("POST", "/api/teaching", request),

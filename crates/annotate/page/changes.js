@@ -8,14 +8,17 @@ const MAX_TURN = (20 * Math.PI) / 180;
 /** A hand moved by more than this share of the part's length is another grasp. */
 const MAX_MOVE = 0.1;
 const MAX_NAMES = 30;
-const WORDS = { less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere", more: "more is found" };
+const WORDS = { less: "less is found", turned: "the hand is turned", moved: "the hand is elsewhere", more: "more is found", alarm: "more is wrongly found", calm: "less is wrongly found" };
 
 /**
  * The change from the marks `before` to the marks `after`: "more" or "less" are found, or a hand is "turned" or
- * "moved"; null without a change. `turns`: number of turns in which the part looks the same, 0 for any.
+ * "moved"; in a picture without the part (`isAbsent`) "alarm" or "calm"; null without a change. `turns`: number of
+ * turns in which the part looks the same, 0 for any.
  */
-export function changeOf(before, after, turns) {
-  if (after.length !== before.length) return after.length > before.length ? "more" : "less";
+export function changeOf(before, after, turns, isAbsent) {
+  const more = after.length - before.length;
+  if (isAbsent) return more ? (more > 0 ? "alarm" : "calm") : null;
+  if (more) return more > 0 ? "more" : "less";
   // A part that looks the same when turned may be held at the opposite place: then the middle of its box is compared.
   const place = ({ box: [x1, y1, x2, y2], grasp }) => (turns === 1 ? gripperOf(grasp).center : times([x1 + x2, y1 + y2], 0.5));
   const left = [...after];

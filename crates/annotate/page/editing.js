@@ -1,26 +1,36 @@
 // Changes of marks: undoable, saved at once.
 
 import { api, isLost, present } from "./api.js";
-import { areaOf, boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, nearestWithin, norm, placedAt, sub } from "./geometry.js";
+import { wait } from "./elements.js";
+import { areaOf, boundsOf, clamp, graspOf, gripperOf, isWithin, nearestWithin, norm, placedAt, sub } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 
 /** Coordinates are rounded to a hundredth of a pixel. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Adds the page's own fields to the server's view of a photo. `past`, `future`: committed marks as JSON, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered. */
-export function adopt(view) {
-  const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, found: null, waiting: [] };
+/** The page's own fields for marks of the server. `committed`, `sent`: marks as JSON, rounded; `past`, `future`: committed marks, each with `found`, the way in which the outline was found; `waiting`: strokes not yet answered. */
+function fieldsOf(marks) {
+  const sent = JSON.stringify(marks, round);
+  return { marks: JSON.parse(sent), sent, committed: sent, future: [], found: null, waiting: [] };
 }
 
-/** Replaces marks by those that another page has changed, as an undoable step. Marks that are being changed here stay. */
-export function adoptChange(target, { marks, advice, saved }) {
-  if (textOf(marks) === textOf(JSON.parse(target.sent)) || JSON.stringify(target.marks) !== target.committed) return;
-  const sent = JSON.stringify(marks);
+/** Adds the page's own fields to the server's view of a photo. */
+export const adopt = (view) => ({ ...view, ...fieldsOf(view.marks), past: [], revision: 0 });
+
+const isBeingChanged = (target) => JSON.stringify(target.marks) !== target.committed;
+
+/** Replaces marks by those of another page or program, as an undoable step. */
+function replace(target, { marks, advice, saved, note }) {
   target.past.push([target.committed, target.found]);
-  Object.assign(target, { marks, advice, saved, sent, committed: sent, future: [], found: null, waiting: [], revision: target.revision + 1 });
+  Object.assign(target, { advice, saved, note, ...fieldsOf(marks), revision: target.revision + 1 });
   if (target === image()) Object.assign(state, { draft: null, vertex: null });
+}
+
+/** Adopts marks that another page has changed. Marks that are being changed here stay. */
+export function adoptChange(target, view) {
+  const known = [target.sent, target.committed].map((json) => textOf(JSON.parse(json)));
+  if (!known.includes(textOf(view.marks)) && !isBeingChanged(target)) replace(target, view);
 }
 
 /** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
@@ -70,12 +80,19 @@ export async function save(target) {
     sent = target.revision;
     try {
       const sending = JSON.stringify(target.marks);
-      const view = await api.saveMarks(target.id, target.marks);
-      // Marks that could not be written to disk are kept and sent again.
-      Object.assign(target, { saved: view.saved, advice: view.advice, sent: view.saved.by_disk ? target.sent : sending });
+      const { saved, advice } = await api.saveMarks(target.id, target.marks);
+      Object.assign(target, { saved, advice, sent: saved.state === "refused" ? target.sent : sending });
     } catch (error) {
-      target.saved = { state: "refused", why: error.message, lost: error.lost };
-      if (error.lost) sent = -1;
+      if (error.image) {
+        while (isBeingChanged(target)) await wait(50);
+        replace(target, error.image);
+        sent = target.revision;
+        toast(`${target.name}: ${error.message}. “Undo” restores it.`);
+      } else {
+        // Marks that the server did not take are kept and sent again, as those that it could not write to disk.
+        target.saved = { state: "refused", why: error.message, lost: error.lost, by_disk: !error.lost };
+        if (error.lost) sent = -1;
+      }
     }
     changed();
   }
@@ -126,8 +143,10 @@ export function boxDrawn() {
 }
 
 export function placeGripper(point) {
-  const part = region() ?? boxPolygon([0, 0, ...size()]);
-  setGripper(placedAt(point, part));
+  const part = region();
+  // Without a box, the size of the part is not known.
+  const width = Math.max(...size()) / 9;
+  setGripper(part ? placedAt(point, part) : { center: point, angle: 0, length: width, width });
   image().placed = { point, grasp: JSON.stringify(marks().grasp, round) };
   Object.assign(state, { selected: "grasp", tool: "select" });
   commit();

@@ -1,10 +1,9 @@
 // The other pictures of the project's folder, and photos from elsewhere, which can be added.
 
 import { api } from "./api.js";
-import { adopt } from "./editing.js";
 import { button, by, element } from "./elements.js";
 import { adoptModels, changed, isLive, state } from "./store.js";
-import { openImage, openTrialPicture } from "./strip.js";
+import { adoptPhoto, adoptTrial, openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 import { byName, listText } from "./words.js";
@@ -25,10 +24,8 @@ async function refresh() {
 }
 
 function took(view) {
-  const at = state.images.findIndex((photo) => photo.id === view.id);
-  if (at < 0) state.images.push(adopt(view));
   openTab("mark");
-  openImage(at < 0 ? state.images.length - 1 : at);
+  openImage(adoptPhoto(view));
 }
 
 /** Runs an operation that adds pictures and reports its errors. */
@@ -51,7 +48,7 @@ const takeTrials = (ids) => take(async () => {
   const errors = [];
   for (const id of ids) {
     const trial = await api.addOtherTrial(id).catch((error) => void errors.push(error));
-    if (trial) state.trialPictures.push({ ...trial, detections: null });
+    if (trial) adoptTrial(trial);
     if (errors.at(-1)?.lost) break;
   }
   openTrialPicture(first);

@@ -38,16 +38,13 @@ export function boundsOf(points) {
 export const areaOf = (polygon) => Math.abs(polygon.reduce((sum, [x, y], i) => sum + polygon.at(i - 1)[0] * y - x * polygon.at(i - 1)[1], 0)) / 2;
 
 /** The point of the edge from `a` to `b` that is nearest to a point. */
-function footOn(point, a, b) {
+export function footOn(point, a, b) {
   const along = sub(b, a);
   return add(a, times(along, clamp(dot(sub(point, a), along) / (dot(along, along) || 1), 0, 1)));
 }
 
-/** Distance from a point to the edge from `a` to `b`. */
-export const distanceToEdge = (point, a, b) => norm(sub(point, footOn(point, a, b)));
-
 /** Distance from a point to a polygon's outline. */
-export const distanceTo = (polygon, point) => Math.min(...polygon.map((to, i) => distanceToEdge(point, polygon.at(i - 1), to)));
+export const distanceTo = (polygon, point) => Math.min(...polygon.map((to, i) => norm(sub(point, footOn(point, polygon.at(i - 1), to)))));
 
 /** Whether a point is inside a polygon: a ray to the right crosses the polygon's edges an odd number of times. */
 export function isWithin([x, y], polygon) {

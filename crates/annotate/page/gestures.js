@@ -1,7 +1,7 @@
 // Gestures of mouse, pen and fingers on the photo.
 
 import { by } from "./elements.js";
-import { add, direction, distanceTo, distanceToEdge, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
+import { add, direction, distanceTo, dot, fittedWidth, footOn, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, inPhoto, moveEdges, placeGripper, setBox, setGripper, setTool, strokeOutline } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX, REACH_PX } from "./overlay.js";
@@ -147,13 +147,16 @@ function draggingVertex(vertex) {
   });
 }
 
-/** A new point where the outline's line was grabbed. */
+/** A new point on the outline's line where this is dragged; a click adds none. */
 function draggingLine(from) {
   const { outline } = marks();
-  const distance = (i) => distanceToEdge(from, outline[i], outline[(i + 1) % outline.length]);
-  const nearest = outline.reduce((best, _, i) => (distance(i) < distance(best) ? i : best), 0);
-  outline.splice(nearest + 1, 0, from);
-  return draggingVertex(nearest + 1);
+  const feet = outline.map((to, i) => footOn(from, outline.at(i - 1), to));
+  const distances = feet.map((foot) => norm(sub(from, foot)));
+  const nearest = distances.indexOf(Math.min(...distances));
+  return correcting((to) => {
+    if (state.vertex === null) outline.splice((state.vertex = nearest), 0, from);
+    outline[nearest] = inPhoto(add(feet[nearest], sub(to, from)));
+  });
 }
 
 function draggingGripper(data, from) {

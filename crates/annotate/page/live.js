@@ -1,11 +1,10 @@
 // The camera: its newest picture on the stage, photos taken from it, and the taught model applied to it continuously.
 
 import { api } from "./api.js";
-import { adopt } from "./editing.js";
 import { by, element, offBecause, setText, shows, wait } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { numbered } from "./overlay.js";
-import { openImage, showCurrent } from "./strip.js";
+import { adoptPhoto, adoptTrial, openImage, showCurrent } from "./strip.js";
 import { changed, isAccepted, isFound, isLive, isRunning, MODEL_LIMIT, state, touchedBy } from "./store.js";
 import { toast } from "./toast.js";
 import { replacePicture } from "./view.js";
@@ -118,8 +117,7 @@ export async function takePhoto() {
   changed();
   try {
     const view = await api.takePhoto(live.number);
-    state.images.push(adopt(view));
-    openImage(state.images.length - 1);
+    openImage(adoptPhoto(view));
     // The button disappears with the live picture.
     by("overlay").focus({ preventScroll: true });
     toast(`Photo taken: ${view.name}`);
@@ -152,7 +150,7 @@ export async function keepPicture() {
   try {
     const trial = await api.keepFrame(number);
     // After a failed search, the kept picture is searched again.
-    state.trialPictures.push({ ...trial, detections: failed ? null : detections, seconds });
+    adoptTrial({ ...trial, detections: failed ? null : detections, seconds });
     toast(`Kept as ${trial.name}`);
   } catch (error) {
     toast(error.message);

@@ -1,7 +1,6 @@
 // The page: loads the session from the server, then renders `state` after every change.
 
 import { api, belongTo } from "./api.js";
-import { adopt } from "./editing.js";
 import { by, stored } from "./elements.js";
 import { openFolder, renderFolder } from "./folder.js";
 import "./gestures.js";
@@ -13,8 +12,8 @@ import { renderRegion } from "./region.js";
 import { renderSamples } from "./samples.js";
 import { beat, renderUnsaved, sendKept } from "./server_end.js";
 import { showStart } from "./start.js";
-import { adoptModels, onChange, state } from "./store.js";
-import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
+import { onChange, state } from "./store.js";
+import { adoptSession, openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
 import { renderTeach, watch } from "./teach.js";
 import { notice } from "./toast.js";
@@ -68,12 +67,10 @@ async function open(session) {
     others: session.others,
     project: session.project,
     isCalibrated: session.is_calibrated,
-    images: session.images.map(adopt),
-    trialPictures: session.trial_pictures.map((trial) => ({ ...trial, detections: null })),
     teaching,
     camera: session.camera,
   });
-  adoptModels(session);
+  adoptSession(session);
   if (state.images.length) openImage(session.shown);
   else showCurrent();
   by("projects").hidden = !session.can_close;

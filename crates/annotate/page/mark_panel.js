@@ -56,7 +56,7 @@ async function rename() {
   try {
     const session = await api.rename(label.value);
     Object.assign(state, { label: session.label, isNamed: session.is_named });
-    for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id) ?? {}, { saved });
+    for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id && known.saved.state !== "refused") ?? {}, { saved });
   } catch (error) {
     toast(error.message);
   }

@@ -2,10 +2,10 @@
 // back.
 
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
-import { adopt, adoptChange, save, textOf } from "./editing.js";
+import { adoptChange, save, textOf } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
-import { adoptModels, changed, state } from "./store.js";
-import { showCurrent } from "./strip.js";
+import { changed, state } from "./store.js";
+import { adoptSession, showCurrent } from "./strip.js";
 import { follow } from "./teach.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
@@ -17,7 +17,7 @@ const RETRY_MS = 1500;
 /** The key of this project's waiting marks in the browser's storage. */
 const keptKey = () => `kept-marks:${state.project}`;
 
-const isUnsaved = (target) => target.saving || target.saved.lost || target.saved.by_disk;
+const isUnsaved = ({ saving, saved }) => saving || saved.state === "refused";
 
 /** The waiting marks of all tabs by the photos' keys, and the keys of those that this tab has stored. */
 const kept = () => JSON.parse(stored(keptKey()) ?? "{}");
@@ -58,16 +58,6 @@ onLoss((lost) => {
   } else toast("sdg annotate answers again.");
 });
 
-/** Pairs each entry of `known` with the one in `views` of the same name; equal names are paired in order. */
-function pairsByName(known, views) {
-  const left = [...views];
-  const pairs = known.map((entry) => {
-    const at = left.findIndex((view) => view.name === entry.name);
-    return [entry, at < 0 ? null : left.splice(at, 1)[0]];
-  });
-  return { pairs, further: left };
-}
-
 /** Adopts the numbers of a restarted server, if there is one; then waiting marks are sent. */
 async function meetAgain() {
   let session;
@@ -77,33 +67,32 @@ async function meetAgain() {
     // The next check tries again.
     return;
   }
-  // The server was started without this project: waiting marks are kept and sent when it is opened again.
-  if (session.start || session.project !== state.project) return location.reload();
+  // The server was started without this project: waiting marks are kept and sent when it is opened again. After a start with another camera or name, the page is loaded anew.
+  const settings = ({ project, camera, label }, isCalibrated) => String([project, camera, label, isCalibrated]);
+  if (session.start || settings(session, session.is_calibrated) !== settings(state, state.isCalibrated)) return location.reload();
   // Another call of this function was faster.
   if (!isLost()) return;
   const gone = [];
-  const adoptNumbers = (entries, views, take) => {
-    const { pairs, further } = pairsByName(entries, views);
-    for (const [entry, view] of pairs) {
-      if (view) take(entry, view);
-      else gone.push(Object.assign(entry, { isGone: true }).name);
-    }
-    return [pairs.filter(([, view]) => view).map(([entry]) => entry), further];
-  };
-  const [images, newImages] = adoptNumbers(state.images, session.images, (known, { id, advice, saved }) => {
-    Object.assign(known, isUnsaved(known) ? { id } : { id, advice, saved });
+  // The entries that are in `views`, by name; equal names are paired in order.
+  const renumbered = (entries, [...views], take) => entries.filter((entry) => {
+    const at = views.findIndex(({ name }) => name === entry.name);
+    if (at < 0) gone.push(Object.assign(entry, { isGone: true }).name);
+    else take(entry, views.splice(at, 1)[0]);
+    return at >= 0;
   });
-  const [trials, newTrials] = adoptNumbers(state.trialPictures, session.trial_pictures, Object.assign);
   const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
-  Object.assign(state, {
-    images: [...images, ...newImages.map(adopt)],
-    trialPictures: [...trials, ...newTrials.map((view) => ({ ...view, detections: null }))],
+  state.images = renumbered(state.images, session.images, (known, view) => {
+    known.id = view.id;
+    if (!isUnsaved(known)) adoptChange(known, view);
   });
-  adoptModels(session);
+  state.trialPictures = renumbered(state.trialPictures, session.trial_pictures, Object.assign);
+  adoptSession(session);
   state.current = Math.max(state.images.indexOf(shown), 0);
   state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
   belongTo(session);
   setLost(false);
+  // The server knows none of the marks that were refused.
+  state.images.filter(isUnsaved).forEach(save);
   sendKept();
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
   if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
@@ -124,7 +113,7 @@ export async function sendKept() {
     if (textOf(target.marks) !== textOf(JSON.parse(was)) || JSON.stringify(marks) === was) continue;
     target.past.push([target.committed, null]);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
-    sent.push(save(target).then(() => target.saved.state === "written"));
+    sent.push(save(target).then(() => target.saved.state === "written" && target.marks === marks));
   }
   const count = (await Promise.all(sent)).filter(Boolean).length;
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
@@ -132,20 +121,21 @@ export async function sendKept() {
 
 window.addEventListener("pagehide", keep);
 
-/** Adopts marks that another page of the session has changed (the next change here would write over them), and its choice of model and region. */
+/** Adopts marks that another page of the session has changed (the next change here would write over them), its further pictures, and its choice of model and region. */
 async function adoptChanges() {
   if (isLost() || document.hidden) return;
   const before = state.images.map((target) => [target, target.revision]);
   // If the server is gone, a banner says so.
   const session = await api.session().catch(() => null);
   if (!session) return;
-  adoptModels(session);
+  adoptSession(session);
   for (const [target, revision] of before) {
     const view = session.images.find(({ id }) => id === target.id);
-    if (view && revision === target.revision && !isUnsaved(target)) adoptChange(target, view);
+    if (view && revision === target.revision && !target.saving) adoptChange(target, view);
   }
   keep();
-  changed();
+  // The stage shows the first picture of a page that had none.
+  (by("photo").hidden ? showCurrent : changed)();
 }
 for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);
 

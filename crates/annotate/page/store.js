@@ -10,6 +10,8 @@ export const state = {
   project: undefined,
   others: [],
   models: [],
+  /** The version that was in use when the last one was taught, if that was while the page was open. */
+  replaced: null,
   /** Whether the camera of the photos is calibrated: the size of the part is then known. */
   isCalibrated: false,
   /** Photos of the part: the server's view of each, and `past`, `future` of its marks as JSON. */
@@ -93,12 +95,14 @@ export function searchAgain({ compares }) {
 /** The model in use: the page's, or that of a session. */
 export const currentModel = ({ models } = state) => models.find((model) => model.is_current);
 
-/** Adopts the models and the region of a session. If another page has changed those in use, the pictures are searched again; after a teaching, its end does this. */
+/** Adopts the models and the region of a session. If those in use are others, the pictures are searched again; after a teaching, the detections are compared. */
 export function adoptModels({ models, region }) {
-  const used = (from) => JSON.stringify([currentModel(from)?.id, from.region]);
-  const isOther = models.length === state.models.length && used({ models, region }) !== used(state);
+  const used = (from) => JSON.stringify([currentModel(from)?.file, from.region]);
+  const isOther = used({ models, region }) !== used(state);
+  const isNew = models.length > state.models.length;
+  if (isNew) state.replaced = currentModel();
   Object.assign(state, { models, region, hasModel: Boolean(currentModel({ models })) });
-  if (isOther) searchAgain({ compares: false });
+  if (isOther) searchAgain({ compares: isNew });
 }
 
 export const size = () => [image().width, image().height];

@@ -1,7 +1,7 @@
 // The photos of the part, or the pictures to try, in a row.
 
 import { api } from "./api.js";
-import { nextTool } from "./editing.js";
+import { adopt, nextTool } from "./editing.js";
 import { by, element } from "./elements.js";
 import { toast } from "./toast.js";
 import { adoptModels, changed, image, isAccepted, isComplete, isFound, isLive, state, trialPicture } from "./store.js";
@@ -34,9 +34,25 @@ export function openNext(step) {
   if (next !== undefined) (trying ? openTrialPicture : openImage)(next);
 }
 
-/** Adopts the server's view of the pictures to try and of the models, after a picture was removed or restored. */
-function adoptSession(session) {
-  for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
+const indexOf = (entries, { id }) => entries.findIndex((entry) => entry.id === id);
+
+/** Adds a photo unless it is known, and returns its index. */
+export function adoptPhoto(view) {
+  const at = indexOf(state.images, view);
+  return at < 0 ? state.images.push(adopt(view)) - 1 : at;
+}
+
+/** Adopts the server's view of a picture to try, which may be new. */
+export function adoptTrial(view) {
+  const known = state.trialPictures[indexOf(state.trialPictures, view)];
+  if (known) Object.assign(known, view);
+  else state.trialPictures.push({ detections: null, ...view });
+}
+
+/** Adopts the pictures and the models of a session, which another page may have changed. */
+export function adoptSession(session) {
+  session.images.forEach(adoptPhoto);
+  session.trial_pictures.forEach(adoptTrial);
   adoptModels(session);
 }
 
@@ -50,9 +66,10 @@ async function remove(entries, target, { takeOut, putBack, open }) {
     const back = async () => {
       try {
         const session = await putBack(target.id);
-        entries.splice(index, 0, target);
+        // It may have been added again in another way.
+        if (indexOf(entries, target) < 0) entries.splice(index, 0, target);
         adoptSession(session);
-        open(index);
+        open(indexOf(entries, target));
       } catch (error) {
         toast(error.message);
       }

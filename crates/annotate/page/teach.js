@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { by, element, offBecause, setText, wait } from "./elements.js";
 import { isOld, OLD, partSettings } from "./part_settings.js";
-import { changed, currentModel, image, isComplete, isRunning, searchAgain, state } from "./store.js";
+import { adoptModels, changed, currentModel, image, isComplete, isRunning, state } from "./store.js";
 import { turnsOf } from "./symmetry.js";
 import { toast } from "./toast.js";
 import { figuresText, gradeOf } from "./versions.js";
@@ -59,7 +59,8 @@ export function teachRequest() {
   const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
   const minutes = number("budget");
   return {
-    model: new FormData(by("teach-form")).get("model"),
+    // Without the marks that it needs, the model stays chosen and the server refuses.
+    model: chosen("model").value,
     time_budget_secs: minutes === null ? null : minutes * 60,
     steps: number("steps"),
     ...partSettings(),
@@ -94,13 +95,11 @@ export async function watch() {
     await wait(POLL_MS);
     try {
       const news = await api.teaching();
-      const isDone = news.status === "done";
       // Nothing is shown between the end of the teaching and its model: results of the model before would be taken for the new one's.
-      const models = isDone ? (await api.session().catch(() => state)).models : state.models;
-      // Another call of this function may have been faster.
-      if (isDone && isRunning()) searchAgain({ compares: true });
+      const session = news.status === "done" ? await api.session().catch(() => state) : state;
       if (news.status === "failed" && isRunning() && state.tab !== "teach") toast(news.error);
-      Object.assign(state, { teaching: news, models });
+      state.teaching = news;
+      adoptModels(session);
     } catch (error) {
       if (!error.lost) toast(error.message);
     }
@@ -233,7 +232,6 @@ export function renderTeach() {
     const reason = needsOutline ? "Needs the outline on every marked photo" : !marked.length && lacks.length && `Needs ${listText(lacks)}`;
     offBecause(input, reason);
     input.closest("label").title = reason || "";
-    if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;
   }
   const start = by("teach-start");
   offBecause(start, !marked.length && "Mark box and grasp on a photo first");

@@ -3,7 +3,7 @@
 import { api, present } from "./api.js";
 import { button, by, element, setText, shows } from "./elements.js";
 import { uploadPhoto } from "./folder.js";
-import { adopt, textOf } from "./editing.js";
+import { textOf } from "./editing.js";
 import { changeOf, changesText } from "./changes.js";
 import { boundsOf } from "./geometry.js";
 import { renderHelps } from "./helps.js";
@@ -11,7 +11,7 @@ import { foundTitle, placeText, touchText } from "./live.js";
 import { MIN_SHOWN, numbered } from "./overlay.js";
 import { exportPictures } from "./export.js";
 import { isOld, OLD } from "./part_settings.js";
-import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
+import { adoptPhoto, adoptTrial, openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { adoptModels, changed, currentModel, isAccepted, isFound, isLive, isRunning, isWaiting, MODEL_LIMIT, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { isQuick, progressText, teach } from "./teach.js";
@@ -83,7 +83,7 @@ async function addPictures(files) {
   const errors = [];
   for (const file of pictures) {
     try {
-      state.trialPictures.push({ ...(await api.addTrialPicture(file)), detections: null });
+      adoptTrial(await api.addTrialPicture(file));
       changed();
     } catch (error) {
       errors.push(error.message);
@@ -120,13 +120,13 @@ async function accept(marks, { correct }) {
   const target = trialPicture();
   try {
     const view = await api.accept(target.id, marks);
-    state.images.push(adopt(view));
+    const index = adoptPhoto(view);
     target.became = view.id;
     // The picture may have kept other marks than those shown; they are not taught unseen.
     const isOther = textOf(view.marks) !== textOf(marks);
     if (correct || isOther) {
       openTab("mark");
-      openImage(state.images.length - 1);
+      openImage(index);
       toast((isOther && view.note) || "Correct the marks; they are saved as you go.");
     } else if (isQuick()) teach({ model: "S" });
     else toast(view.note ?? "Now a demonstration. Teach again to learn from it.");
@@ -145,11 +145,12 @@ function renderLearnt() {
   else if (known.length) {
     const turns = currentModel()?.symmetry ?? 1;
     const marksOf = (detections) => detections.filter(isFound).map(({ marks }) => marks);
-    const pairs = known.map(({ name, before, detections }) => ({ name, was: marksOf(before), is: marksOf(detections) }));
-    const changes = pairs.map(({ name, was, is }) => ({ name, change: changeOf(was, is, turns) }));
-    const [was, is] = ["was", "is"].map((which) => pairs.filter((pair) => pair[which].length).length);
-    text = `The new model finds the part in ${is} of ${known.length} pictures; the one before: in ${was}. ${changesText(changes)}`;
-    isGood = changes.every(({ change }) => change === null || change === "more");
+    const changes = known.map((trial) => ({ name: trial.name, change: changeOf(marksOf(trial.before), marksOf(trial.detections), turns, trial.is_absent) }));
+    const there = known.filter((trial) => !trial.is_absent);
+    const [was, is] = ["before", "detections"].map((which) => there.filter((trial) => trial[which].some(isFound)).length);
+    if (there.length) text = `The new model finds the part in ${is} of ${there.length} pictures; the one before: in ${was}. `;
+    text += changesText(changes);
+    isGood = changes.every(({ change }) => /null|more|calm/.test(change));
   }
   by("learnt").hidden = !text;
   by("learnt").className = isGood ? "learnt" : "warning";

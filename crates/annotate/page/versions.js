@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { changeOf, changesText } from "./changes.js";
 import { button, by, element, shows } from "./elements.js";
 import { isOld, OLD } from "./part_settings.js";
-import { adoptModels, changed, isRunning, searchAgain, state } from "./store.js";
+import { adoptModels, changed, isRunning, state } from "./store.js";
 import { toast } from "./toast.js";
 import { percent, pictures } from "./words.js";
 
@@ -59,10 +59,10 @@ function turnedText({ figures }) {
   return `The grasp in ${photos} points in another direction than that in photo 1, so the model turns the hand at random. “Swap ends” turns a grasp; a part that looks the same in both directions needs its symmetry. `;
 }
 
-/** Warnings, in both steps that show a new model: it is worse than the one before it, or its photos contradict each other. */
+/** Warnings, in both steps that show a new model: it is worse than the one that was in use before it, or its photos contradict each other. */
 function renderWorse() {
   const now = state.models.at(-1);
-  const before = state.models.at(-2);
+  const before = state.replaced ?? state.models.at(-2);
   const isShown = Boolean(now) && now.is_current && !isRunning();
   const isLess = isShown && Boolean(before) && isWorse(now.summary, before.summary);
   const worse = isLess ? `${number(now.id)} is worse on new samples than ${number(before.id)}: ${briefFigures(now.summary)}, before: ${briefFigures(before.summary)}. ` : "";
@@ -79,7 +79,6 @@ const number = (id) => `Model ${id + 1}`;
 async function use(id) {
   try {
     adoptModels(await api.useModel(id));
-    searchAgain({ compares: false });
     toast("This version is now in use, under the model’s name.");
   } catch (error) {
     toast(error.message);
@@ -99,7 +98,7 @@ async function compare() {
     else {
       const turns = state.models[Math.max(...pair)].symmetry ?? 1;
       const known = rows.filter(({ found }) => found);
-      for (const row of known) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns);
+      for (const row of known) row.change = changeOf(...row.found.map(({ accepted }) => accepted), turns, row.is_there === false);
       const failed = rows.length - known.length;
       const text = known.length ? changesText(known) + (failed ? ` ${pictures(failed)} could not be compared.` : "") : "";
       out.replaceChildren(element("p", { textContent: text }), table(rows, pair));

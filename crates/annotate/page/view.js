@@ -29,16 +29,19 @@ export function middle() {
 /** Shows another picture, whole. */
 export function show(url, size, alt) {
   shown = size;
-  if (photo.getAttribute("src") !== url) photo.src = url;
+  replacePicture(url);
   photo.alt = alt;
   [photo.width, photo.height] = size;
   fit();
 }
 
-/** Shows the next picture of the same size and keeps the view. */
+/** Shows the next picture of the same size and keeps the view. The picture before is hidden until then, because the marks are not its own; live pictures, from the memory, are decoded already. */
 export function replacePicture(url) {
+  if (photo.getAttribute("src") === url) return;
+  if (!url.startsWith("blob")) photo.style.visibility = "hidden";
   photo.src = url;
 }
+for (const kind of ["load", "error"]) photo.addEventListener(kind, () => (photo.style.visibility = ""));
 
 /** The scale at which the whole photo is shown. */
 function wholeScale() {

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::page::{BOX, HOLD, Page, shipped_photo};
 use super::photo_to_grasp::patiently;
+use super::project::free_port;
 
 /// The wrist camera in the pose of the shipped photos: straight down from 0.58 m; right in the picture is -y of the
 /// base frame.
@@ -251,4 +252,18 @@ fn the_camera_fits_a_small_screen_in_light_and_dark() {
         }
     }
     page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn after_a_start_with_another_camera_the_page_shows_that_one() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"]);
+    let other = page.folder.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    show(&other, "a.png", &picture());
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.arguments[1] = "dir:other?fps=10&loop".to_owned();
+    page.start_server();
+    page.wait_for("its address", "return document.getElementById('live-why').innerText.includes('other')");
 }

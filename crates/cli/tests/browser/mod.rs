@@ -4,11 +4,13 @@
 //! kept in target/browser-test.
 
 mod calibrating;
+mod clicks;
 mod corrections;
 mod drawn;
 mod film;
 mod keyboard;
 mod live;
+mod other_pages;
 pub(crate) mod page;
 mod photo_to_grasp;
 mod project;

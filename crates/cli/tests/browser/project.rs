@@ -12,7 +12,7 @@ use super::page::{BOX, HOLD, Page, repository, shipped_photo};
 use super::photo_to_grasp::patiently;
 
 /// Opens a project with copies of the pendulum's photo under these names, each with the shipped marks.
-fn open(further: &[&str], photos: &[&str]) -> Page {
+pub fn open(further: &[&str], photos: &[&str]) -> Page {
     let folder = tempfile::tempdir().unwrap();
     let project = folder.path().join("project");
     std::fs::create_dir(&project).unwrap();
@@ -32,18 +32,18 @@ fn shown(page: &Page) {
     page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
 }
 
-fn annotation(path: &Path) -> Annotation {
+pub fn annotation(path: &Path) -> Annotation {
     let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: None };
     Annotation::read(&std::fs::read(path).unwrap(), &facts).unwrap().remove(0)
 }
 
 /// A port that was free a moment ago.
-fn free_port() -> String {
+pub fn free_port() -> String {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string()
 }
 
 /// Waits until the browser keeps marks on photo.png that were not saved.
-fn are_kept(page: &Page) {
+pub fn are_kept(page: &Page) {
     let kept = "return Object.entries(localStorage).some(([key, kept]) =>
         key.startsWith('kept-marks:') && kept.includes('photo.png'))";
     page.wait_for("kept here", kept);

@@ -1,5 +1,5 @@
-//! Versions of the model: a turned hand is a change, the page warns of a worse version, and the page says that a model
-//! is being taught.
+//! Versions of the model: the choice of the next one, a turned hand is a change, pictures without the part, warnings of
+//! a worse version, comparisons, and the page says that a model is being taught.
 
 use serde_json::json;
 
@@ -209,4 +209,98 @@ fn while_the_first_model_is_taught_the_last_step_says_so() {
     page.click("#teach-stop");
     patiently(&page, "the end", "return !document.getElementById('teach-form').hidden");
     page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_chosen_model_stays_chosen_although_the_outline_that_it_needs_is_missing_for_a_while() {
+    let page = marked();
+    page.choose_model("D");
+    page.click("#tab-mark");
+    page.click("[data-clear=outline]");
+    page.settle();
+    page.click("#tab-teach");
+    let is_off = "return document.querySelector('[name=model][value=D]').disabled";
+    page.wait_for("the reason", is_off);
+    let chosen = "return document.querySelector('[name=model]:checked').value";
+    assert_eq!(page.browser.run(chosen, &[]).unwrap(), json!("D"));
+    page.click("#teach-start");
+    page.wait_for("the refusal", "return document.getElementById('teach-error').innerText.includes('outline')");
+    page.click("#tab-mark");
+    page.click("#undo");
+    page.settle();
+    page.click("#tab-teach");
+    page.wait_for("the outline", &is_off.replace("return ", "return !"));
+    assert_eq!(page.browser.run(chosen, &[]).unwrap(), json!("D"));
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn in_pictures_without_the_part_less_is_better() {
+    let page = taught();
+    add(&page, &["there.png", "empty.png"].map(|name| (name.to_owned(), photo())));
+    patiently(&page, "both", "return document.getElementById('strip').innerText.split('1 found').length === 3");
+    // The results of another version are invented.
+    let invent = "return import('/page/store.js').then(({ changed, state }) => {
+            const [empty, there] = state.trialPictures;
+            there.before = there.detections;
+            const [before, detections] = arguments[0] ? [there.detections, []] : [[], there.detections];
+            Object.assign(empty, { is_absent: true, before, detections });
+            changed();
+        })";
+    for (was_found, change, class) in [(true, "less", "learnt"), (false, "more", "warning")] {
+        page.browser.run(invent, &[json!(was_found)]).unwrap();
+        page.settle_frames();
+        let told = format!(
+            "The new model finds the part in 1 of 1 pictures; the one before: in 1. \
+             In 1 picture {change} is wrongly found: empty.png."
+        );
+        assert_eq!(page.text("#learnt"), told);
+        let class_name = page.browser.run("return document.getElementById('learnt').className", &[]).unwrap();
+        assert_eq!(class_name, json!(class));
+    }
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_comparison_does_not_delay_detections() {
+    let page = taught();
+    add(&page, &[("other.png".to_owned(), photo())]);
+    patiently(&page, "a grasp", "return document.getElementById('found').innerText.includes('Found the part')");
+    // The comparison gets no answer.
+    let detect = "const send = window.fetch;
+        window.fetch = (path, options) => path.includes('/compare/') ? new Promise(() => {}) : send(path, options);
+        return import('/page/api.js').then(({ api }) => {
+            api.compareModels(0, 0);
+            return api.detect(0);
+        }).then(({ detections }) => detections.length > 0)";
+    assert_eq!(page.browser.run(detect, &[]).unwrap(), json!(true));
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_new_version_is_compared_with_the_one_that_was_in_use_and_searched_with() {
+    let page = taught();
+    // Three versions are invented; the page learns of the third one while the first is in use.
+    let invent = "return new Promise((done) => setTimeout(done, 500)).then(() => import('/page/store.js'))
+        .then(({ adoptModels, changed, state }) => {
+            const [model] = state.models;
+            const version = (id, found, is_current) => {
+                const made = structuredClone({ ...model, id, is_current, file: `${id}.sdg` });
+                Object.assign(made.summary.figures, { found: [found, 19], wrong: 0, false_alarms: [0, 5] });
+                return made;
+            };
+            const { region } = state;
+            adoptModels({ models: [version(0, 19, true), version(1, 10, false)], region });
+            const { generation } = state;
+            adoptModels({ models: [version(0, 19, false), version(1, 10, false), version(2, 14, true)], region });
+            changed();
+            return state.generation > generation;
+        })";
+    assert_eq!(page.browser.run(invent, &[]).unwrap(), json!(true));
+    page.settle_frames();
+    let told = page.text("#panel-try .worse");
+    assert!(told.contains("Model 3 is worse on new samples than Model 1: 14 of 19 found"), "{told}");
 }

@@ -1,8 +1,9 @@
-//! The visible region of the photo: zooming to a part, a window of another size, and two fingers.
+//! The visible region of the photo: zooming to a part, a window of another size, and two fingers; and another photo.
 
 use serde_json::json;
 
 use super::page::{HOLD, Page};
+use super::project::open;
 
 /// The shown zoom, in percent.
 fn zoom(page: &Page) -> f64 {
@@ -87,5 +88,18 @@ fn the_photo_follows_two_fingers_while_an_outline_is_drawn() {
     page.browser.press(&["\u{e00c}"]).unwrap();
     page.settle_frames();
     assert_eq!(page.browser.run(points, &[]).unwrap(), json!(0), "Esc deletes them");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn the_photo_before_is_not_shown_under_the_marks_of_the_next_one() {
+    let page = open(&[], &["a", "b"]);
+    let open_next = "return import('/page/strip.js').then(({ openImage }) => {
+            openImage(1);
+            return document.getElementById('photo').style.visibility;
+        })";
+    assert_eq!(page.browser.run(open_next, &[]).unwrap(), json!("hidden"));
+    page.wait_for("the next photo", "return document.getElementById('photo').style.visibility === ''");
     page.assert_quiet();
 }
