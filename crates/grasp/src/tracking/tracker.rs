@@ -194,9 +194,10 @@ impl Tracker {
                 })
                 .collect();
             let judged = self.detector.model().judge_in_sequence(&clues, &self.log_sizes());
-            let verdicts = arrived.iter().zip(judged).map(|((track, Refined { followed, .. }, _), judged)| {
-                self.verdict_on_arrived(track, followed, judged)
-            });
+            let verdicts = arrived
+                .iter()
+                .zip(judged)
+                .map(|((track, Refined { followed, .. }, _), judged)| self.verdict_on_arrived(track, followed, judged));
             let mut is_accepted = verdicts.map(|(score, _)| score >= ACCEPTED).collect::<Vec<_>>().into_iter();
             arrived.retain(|_| is_accepted.next() == Some(true));
         }
