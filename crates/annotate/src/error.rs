@@ -78,6 +78,9 @@ pub enum Error {
     /// The page's state does not allow the request.
     #[error("{0}")]
     Busy(&'static str),
+    /// Another program changed the marks of a photo; they were read again.
+    #[error("another program changed these marks; they were read again, without the change here")]
+    MarksChanged,
     /// Nothing has been taught yet.
     #[error("expected a taught model, found none: teach one first")]
     NotTaught,

@@ -181,17 +181,26 @@ impl Session {
         })
     }
 
+    /// A picture of the object, for the page.
+    ///
+    /// # Errors
+    /// Unknown picture.
+    pub(crate) fn image_view(&self, id: usize) -> Result<ImageView> {
+        let state = self.state();
+        state.image(id)?;
+        Ok(state.image_view(id))
+    }
+
     /// Stores new marks of a picture, and writes them to the file if they are valid.
     ///
     /// # Errors
-    /// Unknown picture, or another process has locked or changed its marks.
+    /// Unknown picture, or another process has locked its marks. [`Error::MarksChanged`] if another process has changed
+    /// them: [`Self::image_view`] then has the marks of the file.
     pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let photo = state.image(id)?.picture.path.clone();
         if self.lock_marks(&mut state, &photo)? {
-            return Err(Error::Busy(
-                "another program changed these marks; they were read again, without the change here",
-            ));
+            return Err(Error::MarksChanged);
         }
         state.images[id].marks = marks;
         state.save(id);
