@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use sdg_files::absolute;
 
 use super::{Session, SessionOptions};
+use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
@@ -47,8 +48,8 @@ impl Session {
         let mut marks_files = project.marks.clone();
         // Without the recorded file, the marks are those beside the photo. A missing photo may come back with its file.
         marks_files.retain(|photo, file| {
-            let file = folder.join(file);
-            gone.photos.contains(photo) || [file.with_extension("coco.json"), file].iter().any(|file| file.exists())
+            let files = annotation_file::files_of(&folder.join(photo), &folder.join(file));
+            gone.photos.contains(photo) || files.iter().any(|file| file.exists())
         });
         for (path, marks) in &options.images {
             if let Some(marks) = marks {
