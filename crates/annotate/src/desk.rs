@@ -145,8 +145,7 @@ impl Desk {
         self.start()?;
         let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(session) = &*session {
-            session.check_idle()?;
-            session.release_locks();
+            session.close()?;
         }
         *session = None;
         drop(session);

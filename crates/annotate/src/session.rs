@@ -76,7 +76,7 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 /// A session of the page.
 ///
 /// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the
-/// locks on `locks` and on the teaching's model are taken, never the reverse.
+/// locks on `locks` and those of the teaching are taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
@@ -142,10 +142,15 @@ impl Session {
         self.locks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Releases the locks when the project is closed: the session may remain in use by a running search, and the same
+    /// Closes the project and releases its locks: the session may remain in use by a running search, and the same
     /// project can be opened again at once.
-    pub(crate) fn release_locks(&self) {
+    ///
+    /// # Errors
+    /// A teaching is running.
+    pub(crate) fn close(&self) -> Result<()> {
+        self.teaching.close()?;
         self.locks().clear();
+        Ok(())
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -282,8 +287,9 @@ impl Session {
     /// # Errors
     /// Unknown version, its file cannot be read, a file cannot be written, or a teaching is running.
     pub fn use_version(&self, id: usize) -> Result<()> {
-        self.teaching.check_idle()?;
+        // With the lock, so that a teaching that begins now gets the region that is in use then.
         let mut state = self.state();
+        self.teaching.check_idle()?;
         let path = self.model_path(&state);
         let summary = state.models.get(id)?.summary.clone();
         let bytes = state.models.read(id)?;
@@ -315,6 +321,15 @@ impl Session {
             self.check_fits(region)?;
         }
         let mut state = self.state();
+        // A teaching that began in the meantime has the previous region.
+        if let Err(busy) = self.teaching.check_idle() {
+            let previous = state.region;
+            drop(state);
+            if let Ok(model) = self.teaching.model() {
+                model.look_in(previous).map_err(Error::Teacher)?;
+            }
+            return Err(busy);
+        }
         state.region = region;
         state.save_project()
     }
@@ -401,7 +416,7 @@ impl Session {
     /// An invalid request, a running teaching, or insufficient marks.
     pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
         request.check()?;
-        self.teaching.check_idle()?;
+        let preparation = self.teaching.prepare(request.model)?;
         // The pictures are decoded without the lock: marks that change meanwhile make the model stale.
         let (marked, label, negatives, fingerprint, model_path, region) = {
             let state = self.state();
@@ -435,7 +450,7 @@ impl Session {
             state.save_project()?;
             Ok(model_path)
         };
-        self.teaching.start(Arc::clone(&self.teacher), request, material, keep)
+        Ok(preparation.start(Arc::clone(&self.teacher), request, material, keep))
     }
 
     /// # Errors
