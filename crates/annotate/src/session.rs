@@ -56,6 +56,11 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The file of the model in use, named after the part, beside `home`.
+fn model_file(home: &Path, label: &str) -> PathBuf {
+    home.with_file_name(format!("{}.sdg", safe_stem(label)))
+}
+
 /// The name of a part without surrounding spaces.
 ///
 /// # Errors
@@ -179,13 +184,6 @@ impl Session {
         }
     }
 
-    fn model_path(&self, state: &State) -> PathBuf {
-        self.model_path.clone().unwrap_or_else(|| {
-            let name = format!("{}.sdg", safe_stem(&state.label));
-            self.home.with_file_name(name)
-        })
-    }
-
     /// A picture of the object, for the page.
     ///
     /// # Errors
@@ -203,8 +201,8 @@ impl Session {
     /// them: [`Self::image_view`] then has the marks of the file.
     pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
-        let photo = state.image(id)?.picture.path.clone();
-        if self.lock_marks(&mut state, &photo)? {
+        state.image(id)?;
+        if self.lock_marks_of(&mut state, id)? {
             return Err(Error::MarksChanged);
         }
         state.images[id].marks = marks;
@@ -212,33 +210,41 @@ impl Session {
         Ok(state.image_view(id))
     }
 
-    /// Renames the object, also in all files already written.
+    /// Renames the object, also in all files already written. The model in use is also written under the new name,
+    /// unless another file has that name.
     ///
     /// # Errors
-    /// The name is empty, too long or contains control characters, the project cannot be written, or another process
-    /// has locked the marks of a photo, in which the name then stays.
+    /// The name is empty, too long or contains control characters, the model or the project cannot be written, or
+    /// another process has locked the marks of a photo; then no file has the new name.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = check_label(label)?;
         let mut state = self.state();
+        let is_written = |id: &usize| matches!(state.images[*id].saved, Saved::Written { .. });
+        let ids: Vec<usize> = state.image_ids().filter(is_written).collect();
+        // The locks of all photos of a large project would be more files than a process can open.
+        let num_locks = self.locks().len();
+        for &id in &ids {
+            self.lock_marks_of(&mut state, id)?;
+            self.locks().truncate(num_locks);
+        }
+        if self.model_path.is_none() && !state.is_model_lost {
+            state.models.write_current(&model_file(&self.home, label))?;
+        }
         label.clone_into(&mut state.label);
         state.is_named = true;
         state.save_project()?;
-        let mut renamed = Ok(());
-        let num_locks = self.locks().len();
-        for id in state.image_ids().collect::<Vec<_>>() {
-            if matches!(state.images[id].saved, Saved::Written { .. }) {
-                let photo = state.images[id].picture.path.clone();
-                match self.lock_marks(&mut state, &photo) {
-                    Ok(_) => state.save(id),
-                    Err(error) => renamed = Err(error),
-                }
-                // The locks of all photos of a large project would be more files than a process can open.
-                self.locks().truncate(num_locks);
-            }
+        for id in ids {
+            self.lock_marks_of(&mut state, id)?;
+            state.save(id);
+            self.locks().truncate(num_locks);
         }
         drop(state);
-        renamed?;
         Ok(self.view())
+    }
+
+    fn lock_marks_of(&self, state: &mut State, id: usize) -> Result<bool> {
+        let photo = state.images[id].picture.path.clone();
+        self.lock_marks(state, &photo)
     }
 
     /// A marked picture's file.
@@ -282,7 +288,7 @@ impl Session {
         state.save_project()
     }
 
-    /// Makes a version the model in use, and copies it to the model's file.
+    /// Makes a version the model in use, and copies it to the model's file. It searches the page's region, if it can.
     ///
     /// # Errors
     /// Unknown version, its file cannot be read, a file cannot be written, or a teaching is running.
@@ -290,12 +296,12 @@ impl Session {
         // With the lock, so that a teaching that begins now gets the region that is in use then.
         let mut state = self.state();
         self.teaching.check_idle()?;
-        let path = self.model_path(&state);
+        let path = self.model_path.clone().unwrap_or_else(|| model_file(&self.home, &state.label));
         let summary = state.models.get(id)?.summary.clone();
         let bytes = state.models.read(id)?;
         let open = |searched| self.teacher.open(&bytes, &summary, searched);
-        // The version's own region may not fit the camera's pictures; then the page's applies.
-        let opened = open(None).or_else(|_| open(Some(Searched::of(state.region))));
+        // The part of this version may not fit into the page's region; then the version's own applies.
+        let opened = open(Some(Searched::of(state.region))).or_else(|_| open(None));
         let model = opened.map_err(Error::Teacher)?;
         state.models.use_version(&path, id)?;
         state.region = model.region();
@@ -418,12 +424,10 @@ impl Session {
         request.check()?;
         let preparation = self.teaching.prepare(request.model)?;
         // The pictures are decoded without the lock: marks that change meanwhile make the model stale.
-        let (marked, label, negatives, fingerprint, model_path, region) = {
+        let (marked, label, negatives, fingerprint, region) = {
             let state = self.state();
             let negatives: Vec<_> = state.negatives().cloned().collect();
-            let label = state.label.clone();
-            let model_path = self.model_path(&state);
-            (state.demonstrated(request.model)?, label, negatives, state.material(), model_path, state.region)
+            (state.demonstrated(request.model)?, state.label.clone(), negatives, state.material(), state.region)
         };
         let request = TeachRequest { region, ..request };
         let demonstrations = marked.iter().map(|image| image.demonstration(&label)).collect::<Result<Vec<_>>>()?;
@@ -432,6 +436,7 @@ impl Session {
         let material = TeachingMaterial { demonstrations, negatives };
         let (symmetry, fixed_height) = (Some(request.symmetry), Some(request.fixed_height));
         let state = Arc::clone(&self.state);
+        let (given_path, home) = (self.model_path.clone(), self.home.clone());
         let keep = move |model: &dyn TaughtModel| {
             let bytes = model.to_bytes().map_err(Error::Teacher)?;
             let version = Version {
@@ -445,10 +450,12 @@ impl Session {
                 fixed_height,
             };
             let mut state = locked(&state);
-            state.models.keep(&model_path, &bytes, version)?;
+            // The part may have been renamed during the teaching.
+            let path = given_path.unwrap_or_else(|| model_file(&home, &state.label));
+            let written_to = state.models.keep(&path, &bytes, version)?;
             state.is_model_lost = false;
             state.save_project()?;
-            Ok(model_path)
+            Ok(written_to)
         };
         Ok(preparation.start(Arc::clone(&self.teacher), request, material, keep))
     }
