@@ -47,6 +47,10 @@ pub struct Version {
     pub symmetry: Option<u32>,
     #[serde(default)]
     pub fixed_height: Option<bool>,
+    /// Heights of the marks and of the grasp above the table, in metres; `None` without a calibrated camera, and in files
+    /// of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights_m: Option<[f64; 2]>,
 }
 
 /// All versions, oldest first.
@@ -225,8 +229,17 @@ mod tests {
     fn version(taught_secs: u64) -> Version {
         let summary =
             TaughtSummary { model: ModelKind::S, object: "rod".into(), seconds: 1.0, figures: None, negatives: None };
-        let (file, material) = (String::new(), fingerprint("marks"));
-        Version { file, taught_secs, summary, photos: 1, negatives: 0, material, symmetry: None, fixed_height: None }
+        Version {
+            file: String::new(),
+            taught_secs,
+            summary,
+            photos: 1,
+            negatives: 0,
+            material: fingerprint("marks"),
+            symmetry: None,
+            fixed_height: None,
+            heights_m: None,
+        }
     }
 
     #[test]

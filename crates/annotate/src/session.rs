@@ -50,6 +50,10 @@ pub struct SessionOptions {
     pub max_opening_px: Option<f64>,
     /// Orientation of the pixels of all pictures: the sensor's with a camera's calibration.
     pub pixel_frame: PixelFrame,
+    /// Width and height of photos; `None` without a camera's calibration.
+    pub photo_size: Option<[u32; 2]>,
+    /// Heights of the marks and of the grasp above the table, in metres; `None` without a camera's calibration.
+    pub heights_m: Option<[f64; 2]>,
 }
 
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
@@ -419,15 +423,18 @@ impl Session {
     /// Starts teaching from all marked pictures; [`teaching_news`](Self::teaching_news) gives the progress.
     ///
     /// # Errors
-    /// An invalid request, a running teaching, or insufficient marks.
+    /// An invalid request, a running teaching, insufficient marks, or a picture without the part that has another size
+    /// than those of the calibrated camera.
     pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
         request.check()?;
         let preparation = self.teaching.prepare(request.model)?;
         // The pictures are decoded without the lock: marks that change meanwhile make the model stale.
-        let (marked, label, negatives, fingerprint, region) = {
+        let (marked, label, negatives, fingerprint, region, heights_m) = {
             let state = self.state();
             let negatives: Vec<_> = state.negatives().cloned().collect();
-            (state.demonstrated(request.model)?, state.label.clone(), negatives, state.material(), state.region)
+            negatives.iter().try_for_each(|picture| picture.check_size(state.photo_size))?;
+            let marked = state.demonstrated(request.model)?;
+            (marked, state.label.clone(), negatives, state.material(), state.region, state.heights_m)
         };
         let request = TeachRequest { region, ..request };
         let demonstrations = marked.iter().map(|image| image.demonstration(&label)).collect::<Result<Vec<_>>>()?;
@@ -448,6 +455,7 @@ impl Session {
                 material: fingerprint,
                 symmetry,
                 fixed_height,
+                heights_m,
             };
             let mut state = locked(&state);
             // The part may have been renamed during the teaching.

@@ -329,6 +329,11 @@ fn a_model_file_that_is_gone_is_told_once_and_stays_named() {
     let notes: Vec<&str> = view["notes"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     assert!(notes.len() == 1 && notes[0].matches("cannot read").count() == 1 && notes[0].contains(&name), "{notes:?}");
     assert_eq!(view["models"][0]["is_current"], false);
+    // A file of another content is there, but unsuitable.
+    let folder = served.end();
+    std::fs::write(&file, "no model").unwrap();
+    let served = Served::of_project(folder);
+    assert_eq!(get(&served)["notes"], json!(["The model of this project cannot be used here: no model"]));
     let folder = served.end();
     std::fs::rename(&away, &file).unwrap();
     assert_eq!(get(&Served::of_project(folder))["models"][0]["is_current"], true);

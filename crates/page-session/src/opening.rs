@@ -81,7 +81,8 @@ pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
 
 fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
     let (max_opening_px, pixel_frame) = (teacher.max_opening_px(), teacher.pixel_frame());
-    let options = SessionOptions { max_opening_px, pixel_frame, ..options };
+    let (photo_size, heights_m) = (teacher.photo_size(), teacher.camera.as_ref().map(|(_, heights_m)| *heights_m));
+    let options = SessionOptions { max_opening_px, pixel_frame, photo_size, heights_m, ..options };
     Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
 }
 

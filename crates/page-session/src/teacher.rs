@@ -150,6 +150,11 @@ impl PageTeacher {
         Some(HAND_OPENING_MAX_M / scale)
     }
 
+    /// Width and height of photos, with a calibrated camera.
+    pub fn photo_size(&self) -> Option<[u32; 2]> {
+        self.camera.as_ref().map(|(camera, _)| camera.size_px())
+    }
+
     /// The orientation of the pixels of photos and of pictures to try: a calibration is for the sensor's pixels.
     pub fn pixel_frame(&self) -> PixelFrame {
         if self.camera.is_some() { PixelFrame::Sensor } else { PixelFrame::Upright }

@@ -248,6 +248,7 @@ fn serve_start() -> Serving {
         recent: Some(recent),
         folder: folder.path().to_owned(),
         pixel_frame: PixelFrame::Upright,
+        photo_size: None,
         open: Box::new(open),
     };
     serve(folder, Server::bind_start(start, 0, Some(TOKEN)).expect("a port of this computer"))

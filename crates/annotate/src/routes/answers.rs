@@ -50,6 +50,7 @@ pub fn refusal_with(error: &Error, mut body: Value) -> Response {
         Error::Demonstration { .. }
         | Error::NotMarked { .. }
         | Error::SharedMarks { .. }
+        | Error::OtherSize { .. }
         | Error::Request { .. }
         | Error::Teacher(_) => 422,
         Error::Busy(_)
