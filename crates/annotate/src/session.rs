@@ -65,6 +65,16 @@ fn model_file(home: &Path, label: &str) -> PathBuf {
     home.with_file_name(format!("{}.sdg", safe_stem(label)))
 }
 
+/// The inputs of a teaching, with the negatives' pixels.
+///
+/// # Errors
+/// A picture cannot be read.
+fn teaching_material(demonstrations: Vec<Demonstration>, negatives: &[Picture]) -> Result<TeachingMaterial> {
+    let negative_names = negatives.iter().map(|picture| picture.name.clone()).collect();
+    let negatives = negatives.iter().map(Picture::pixels).collect::<Result<_>>()?;
+    Ok(TeachingMaterial { demonstrations, negatives, negative_names })
+}
+
 /// The name of a part without surrounding spaces.
 ///
 /// # Errors
@@ -438,9 +448,8 @@ impl Session {
         };
         let request = TeachRequest { region, ..request };
         let demonstrations = marked.iter().map(|image| image.demonstration(&label)).collect::<Result<Vec<_>>>()?;
-        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
         let [photos, num_negatives] = [demonstrations.len(), negatives.len()];
-        let material = TeachingMaterial { demonstrations, negatives };
+        let material = teaching_material(demonstrations, &negatives)?;
         let (symmetry, fixed_height) = (Some(request.symmetry), Some(request.fixed_height));
         let state = Arc::clone(&self.state);
         let (given_path, home) = (self.model_path.clone(), self.home.clone());

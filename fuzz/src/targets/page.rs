@@ -85,6 +85,7 @@ pub(super) const PAGE: Target = Target {
             &[live, ("GET", "/api/live/3/picture", b"")],
             &[live, ("POST", "/api/live/3/photo", b"")],
             &[live, ("POST", "/api/live/3/keep", b"")],
+            &[live, ("POST", "/api/live/3/hold", b"")],
             &[live, ("POST", "/api/live/3/detect", b"")],
             &[marked, ("GET", "/api/images/0/samples/1?seed=7", b"")],
             &[marked, ("POST", "/api/teaching", teaching)],

@@ -34,6 +34,7 @@
 //! | `GET /api/live` | the number of the camera's newest frame, and the camera's fault |
 //! | `GET /api/live/{number}/picture` | a frame that was shown, as JPEG |
 //! | `POST /api/live/{number}/detect` | grasps in the frame |
+//! | `POST /api/live/{number}/hold` | keeps the frame while later ones are shown, for a page that pauses |
 //! | `POST /api/live/{number}/photo` | writes the frame as a photo of the part |
 //! | `POST /api/live/{number}/keep` | makes the frame a picture to try |
 

@@ -4,7 +4,7 @@ use sdg_demonstration::ModelKind;
 use sdg_files::absolute;
 use serde::Deserialize;
 
-use super::{MAX_LABEL_CHARS, Session};
+use super::{MAX_LABEL_CHARS, Session, teaching_material};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name};
@@ -12,7 +12,7 @@ use crate::picture::{Picture, extension_of, png};
 use crate::project_file::MAX_TRIAL_PICTURES;
 use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
-use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
+use crate::teacher::{TaughtModel, TeachRequest};
 use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
 
 /// A query whether learning from a picture would help in other pictures.
@@ -189,9 +189,8 @@ impl Session {
             (MarkedPicture::unsaved(picture, marks).demonstration(&state.label)?, negatives, pictures, state.region)
         };
         demonstrations.push(further);
-        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
         let request = TeachRequest { region, ..teaching };
-        let material = TeachingMaterial { demonstrations, negatives };
+        let material = teaching_material(demonstrations, &negatives)?;
         let model = self.teacher.teach_on_trial(&material, &request).map_err(Error::Teacher)?;
         let best_in = |(id, picture): (usize, Picture)| {
             let found = model.detect(&picture.pixels()?).map_err(Error::Teacher)?;
