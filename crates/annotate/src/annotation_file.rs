@@ -51,9 +51,9 @@ impl Opened {
     }
 }
 
-/// The files that may have the marks of a picture whose marks are in `annotation`, the preferred one first: the file for
-/// changes if `annotation` is another tool's file, the one for changes by earlier programs, and `annotation`. Several
-/// pictures may have their marks in one `annotation`, so each has its own file for changes.
+/// The files that may have the marks of a picture whose marks are in `annotation`, the preferred one first: the file
+/// for changes if `annotation` is another tool's file, the one for changes by earlier programs, and `annotation`.
+/// Several pictures may have their marks in one `annotation`, so each has its own file for changes.
 pub fn files_of(picture: &Path, annotation: &Path) -> [PathBuf; 3] {
     let earlier = annotation.with_extension("coco.json");
     let changes = if annotation.file_stem() == picture.file_stem() {
@@ -97,8 +97,8 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
         let target = if writable { path } else { other };
         let note = match (objects.len(), writable) {
             (0 | 1, true) if path != own && is_newer(own, path) => Some(format!(
-                "{0} was written after {1}, and its marks are not shown: the marks are those in {1}. Without {1}, {0} is \
-                 read.",
+                "{0} was written after {1}, and its marks are not shown: the marks are those in {1}. Without {1}, {0} \
+                 is read.",
                 file_name(own),
                 file_name(path)
             )),

@@ -47,8 +47,8 @@ pub struct Version {
     pub symmetry: Option<u32>,
     #[serde(default)]
     pub fixed_height: Option<bool>,
-    /// Heights of the marks and of the grasp above the table, in metres; `None` without a calibrated camera, and in files
-    /// of earlier programs.
+    /// Heights of the marks and of the grasp above the table, in metres; `None` without a calibrated camera, and in
+    /// files of earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heights_m: Option<[f64; 2]>,
 }
@@ -99,8 +99,8 @@ impl ModelVersions {
         absolute(&self.default_folder).parent().map(Path::to_owned).unwrap_or_default()
     }
 
-    /// Writes a new version under its own name and makes it the one in use, at `path` or, if that is the model in use of
-    /// another project, at a numbered path. Returns this path.
+    /// Writes a new version under its own name and makes it the one in use, at `path` or, if that is the model in use
+    /// of another project, at a numbered path. Returns this path.
     ///
     /// # Errors
     /// A file cannot be written.

@@ -49,7 +49,8 @@ impl Picture {
     /// calibrated camera's pictures.
     ///
     /// # Errors
-    /// The bytes are not a picture, or an Exif orientation rotates a photo of a calibrated camera or it has another size.
+    /// The bytes are not a picture, or an Exif orientation rotates a photo of a calibrated camera or it has another
+    /// size.
     pub fn check_photo(bytes: &[u8], name: &str, frame: PixelFrame, size: Option<[u32; 2]>) -> Result<()> {
         if frame == PixelFrame::Sensor {
             check_is_not_turned(bytes, name)?;

@@ -17,7 +17,8 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::{Share, TaughtFile, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
-    CheckConfig, GraspError, GraspModel, Preset, TeachOptions, TeachingEvent, check_region_from_above, check_teaching_region,
+    CheckConfig, GraspError, GraspModel, Preset, TeachOptions, TeachingEvent, check_region_from_above,
+    check_teaching_region,
 };
 use sdg_inputs::camera_files::CameraFile;
 use sdg_inputs::one_line;

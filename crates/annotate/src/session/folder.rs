@@ -147,8 +147,8 @@ impl Session {
     /// lies there already.
     ///
     /// # Errors
-    /// The bytes are not a picture, an Exif orientation rotates a photo of a calibrated camera or it has another size, or
-    /// the file cannot be written.
+    /// The bytes are not a picture, an Exif orientation rotates a photo of a calibrated camera or it has another size,
+    /// or the file cannot be written.
     pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
         let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
         let size = self.state().photo_size;

@@ -28,8 +28,8 @@ impl Session {
     /// Neither picture nor camera, a given picture that cannot be read, marks of a given picture that belong to another
     /// picture or are in the file of another photo, a given photo of another size than those of the calibrated camera,
     /// another file in the place of a project's, or a photo of a calibrated camera that an Exif orientation rotates.
-    /// Unreadable pictures of the project or of a folder, and photos of the project with these faults of marks and size,
-    /// are left out; the notes for the user name them.
+    /// Unreadable pictures of the project or of a folder, and photos of the project with these faults of marks and
+    /// size, are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),

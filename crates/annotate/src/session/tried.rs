@@ -4,7 +4,8 @@ use sdg_demonstration::ModelKind;
 use sdg_files::absolute;
 use serde::Deserialize;
 
-use super::{MAX_LABEL_CHARS, Session, teaching_material};
+use super::models::teaching_material;
+use super::{MAX_LABEL_CHARS, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name};
