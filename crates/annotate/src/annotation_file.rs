@@ -4,11 +4,14 @@
 //! photo.png ─┬─ photo.coco.json   where marks are written if photo.json is another tool's file
 //!            ├─ photo.json        where marks are written otherwise
 //!            └─ photo.txt         YOLO-pose, also in the folder labels of a dataset: only read
+//! photo.png:all.json ─┬─ all.photo.png.coco.json   where marks are written if all.json is another tool's file
+//!                     └─ all.json                  where marks are written otherwise
 //! ```
 //!
 //! A file with more information than the page would write back (LabelMe's flags, further objects, further pictures) is
 //! read and never written.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -19,6 +22,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::marks::Marks;
+use crate::names::file_name;
 
 /// Maximum size of an annotation file.
 const MAX_BYTES: u64 = 64 << 20;
@@ -47,21 +51,38 @@ impl Opened {
     }
 }
 
-/// Reads the marks of a picture from `annotation`, or from the file beside it with `.coco.json` if that exists; without
-/// `annotation`, from the first file of [`marks_of_photo`]. A text file that was not named may be about anything: if it
-/// cannot be read as marks, a note says so.
+/// The files that may have the marks of a picture whose marks are in `annotation`, the preferred one first: the file
+/// for changes if `annotation` is another tool's file, the one for changes by earlier programs, and `annotation`.
+/// Several pictures may have their marks in one `annotation`, so each has its own file for changes.
+pub fn files_of(picture: &Path, annotation: &Path) -> [PathBuf; 3] {
+    let earlier = annotation.with_extension("coco.json");
+    let changes = if annotation.file_stem() == picture.file_stem() {
+        earlier.clone()
+    } else {
+        annotation.with_extension(format!("{}.coco.json", file_name(picture)))
+    };
+    [changes, earlier, annotation.to_owned()]
+}
+
+/// Reads the marks of a picture from the first existing file of [`files_of`] or, without `annotation`, of
+/// [`marks_of_photo`]. A text file that was not named may be about anything: if it cannot be read as marks, a note says
+/// so.
 ///
 /// # Errors
 /// The file exists but cannot be read, is no annotation, or belongs to another picture.
 pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result<Opened> {
-    let own = annotation.map_or_else(|| picture.with_extension("json"), Path::to_owned);
-    let spare = own.with_extension("coco.json");
-    let file_name = picture.file_name().and_then(|name| name.to_str());
-    let facts = ImageFacts { width: size[0], height: size[1], file_name };
-    let searched = annotation.map_or_else(|| marks_of_photo(picture), |_| vec![spare.clone(), own.clone()]);
+    let beside = picture.with_extension("json");
+    let files = files_of(picture, annotation.unwrap_or(&beside));
+    let [spare, earlier, own] = &files;
+    let facts = ImageFacts { width: size[0], height: size[1], file_name: picture.file_name().and_then(OsStr::to_str) };
+    let searched = annotation.map_or_else(|| marks_of_photo(picture), |_| files.to_vec());
     let mut unread = None;
     for path in &searched {
-        let is_named = [&spare, &own].contains(&path);
+        let is_named = files.contains(path);
+        // Earlier programs wrote the changes of every picture of a file to this one.
+        if path == earlier && earlier != spare && is_of_others(path, &file_name(picture)) {
+            continue;
+        }
         let (bytes, objects) = match read(path, is_named, &facts) {
             Ok(Some(read)) => read,
             Ok(None) => continue,
@@ -72,16 +93,23 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
             }
         };
         let writable = is_ours(&bytes);
-        let other = if is_named { &spare } else { &own };
+        let other = if is_named { spare } else { own };
         let target = if writable { path } else { other };
-        let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let note = match (objects.len(), writable) {
+            (0 | 1, true) if path != own && is_newer(own, path) => Some(format!(
+                "{0} was written after {1}, and its marks are not shown: the marks are those in {1}. Without {1}, {0} \
+                 is read.",
+                file_name(own),
+                file_name(path)
+            )),
             (0 | 1, true) => None,
-            (0 | 1, false) => Some(format!("{} is kept unchanged; changes go to {}.", named(path), named(target))),
+            (0 | 1, false) => {
+                Some(format!("{} is kept unchanged; changes go to {}.", file_name(path), file_name(target)))
+            }
             (count, _) => Some(format!(
                 "{} marks {count} objects; the first is shown. Changes go to {}.",
-                named(path),
-                named(other)
+                file_name(path),
+                file_name(other)
             )),
         };
         let target = if objects.len() > 1 { other } else { target };
@@ -94,7 +122,21 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
             note,
         });
     }
-    Ok(Opened { label: None, marks: Marks::default(), path: own, found: None, note: unread })
+    Ok(Opened { label: None, marks: Marks::default(), path: own.clone(), found: None, note: unread })
+}
+
+/// Whether a file is a COCO file of other pictures only.
+fn is_of_others(path: &Path, picture: &str) -> bool {
+    let bytes = read_if_there(path).ok().flatten();
+    let file = bytes.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+    let is_other = |image: &Value| image["file_name"].as_str().is_some_and(|name| name != picture);
+    file.is_some_and(|file| file["images"].as_array().is_some_and(|images| images.iter().all(is_other)))
+}
+
+/// Whether a file was written later than another one.
+fn is_newer(one: &Path, other: &Path) -> bool {
+    let written = |path: &Path| fs::metadata(path).and_then(|metadata| metadata.modified());
+    written(one).is_ok_and(|one| written(other).is_ok_and(|other| one > other))
 }
 
 /// The bytes of a file and the objects in it; `None` without a file, and for another text that was not named.
@@ -186,6 +228,8 @@ pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 
 mod tests {
     use super::*;
     use crate::marks::GraspMarks;
+    use sdg_demonstration::CocoFile;
+    use std::time::{Duration, SystemTime};
 
     const SIZE: [u32; 2] = [200, 100];
 
@@ -227,7 +271,35 @@ mod tests {
         assert!(opened.note.as_ref().unwrap().contains("photo.json is kept unchanged"), "{opened:?}");
         save(&opened.path, &marks(), "bar", "photo.png", SIZE, true).unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("photo.json")).unwrap(), labelme);
-        assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks(), "the newer file is the one that counts");
+        let again = open(&picture, None, SIZE).unwrap();
+        assert_eq!((again.marks, again.note), (marks(), None), "the newer file is the one that counts");
+        // The tool's later changes are not read, and a note says so.
+        let file = fs::File::options().write(true).open(folder.path().join("photo.json")).unwrap();
+        file.set_modified(SystemTime::now() + Duration::from_secs(60)).unwrap();
+        let later = open(&picture, None, SIZE).unwrap();
+        assert_eq!(later.marks, marks());
+        assert!(later.note.unwrap().starts_with("photo.json was written after photo.coco.json"));
+    }
+
+    #[test]
+    fn pictures_with_marks_in_one_file_have_a_file_for_changes_each() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let mut all = CocoFile::new();
+        for name in ["a.png", "b.png"] {
+            all.push_image(name, SIZE[0], SIZE[1], &[]);
+        }
+        fs::write(at("all.json"), all.to_json()).unwrap();
+        let read = |name: &str| open(&at(name), Some(&at("all.json")), SIZE).unwrap();
+        let path = read("a.png").path;
+        assert!(save(&path, &marks(), "bar", "a.png", SIZE, false).unwrap());
+        let is_read = |name: &str| (read(name).marks.has_object(), read(name).path);
+        assert_eq!(is_read("a.png"), (true, path.clone()));
+        assert_eq!(is_read("b.png"), (false, at("all.b.png.coco.json")));
+        // The file of earlier programs is read for its own picture.
+        fs::rename(&path, at("all.coco.json")).unwrap();
+        assert_eq!(is_read("a.png"), (true, at("all.coco.json")));
+        assert_eq!(is_read("b.png"), (false, at("all.b.png.coco.json")));
     }
 
     #[test]

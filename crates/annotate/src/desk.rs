@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result, TeacherError};
 use crate::model_versions::fingerprint;
-use crate::names::{file_name, safe_stem};
+use crate::names::{PROJECT_FILE, file_name, safe_stem};
 use crate::picture::Picture;
 use crate::project_file::label_of;
 use crate::recent::{RecentProject, RecentProjects};
@@ -27,6 +27,8 @@ pub struct Start {
     pub folder: PathBuf,
     /// Orientation of the pixels of photos.
     pub pixel_frame: PixelFrame,
+    /// Width and height of photos; `None` without a camera's calibration.
+    pub photo_size: Option<[u32; 2]>,
     /// Opens the chosen project.
     pub open: OpenProject,
 }
@@ -119,21 +121,31 @@ impl Desk {
     ///
     /// # Errors
     /// The name is empty or taken, the bytes are not a picture, an Exif orientation rotates a photo of a calibrated
-    /// camera, the folder cannot be created, or another project is open.
+    /// camera or it has another size, the project cannot be written, or another project is open.
     pub fn create(&self, name: &str, photo: &str, bytes: &[u8]) -> Result<FirstView> {
         self.take(|start| {
             let name = check_label(name)?;
             let photo = photo.rsplit(['/', '\\']).next().unwrap_or(photo);
-            Picture::check_photo(bytes, photo, start.pixel_frame)?;
+            Picture::check_photo(bytes, photo, start.pixel_frame, start.photo_size)?;
             let folder = start.folder.join(safe_stem(name));
             std::fs::create_dir(&folder).map_err(Error::file(&folder, "cannot make a new folder of this name"))?;
             let extension = Path::new(photo).extension().unwrap_or_default().to_string_lossy().to_lowercase();
             let stem = safe_stem(&Path::new(photo).file_stem().unwrap_or_default().to_string_lossy());
             let extension = if extension.is_empty() { "png" } else { &extension };
-            sdg_files::write_atomically(&folder.join(format!("{stem}.{extension}")), bytes)?;
-            let session = (start.open)(&folder).map_err(Error::Teacher)?;
-            session.set_label(name)?;
-            Ok(session)
+            let path = folder.join(format!("{stem}.{extension}"));
+            let make = || {
+                sdg_files::write_atomically(&path, bytes)?;
+                let session = (start.open)(&folder).map_err(Error::Teacher)?;
+                session.set_label(name)?;
+                Ok::<_, Error>(session)
+            };
+            make().inspect_err(|_| {
+                // Otherwise the name would be taken. A folder with other files stays.
+                for file in [&path, &folder.join(PROJECT_FILE)] {
+                    let _ = std::fs::remove_file(file);
+                }
+                let _ = std::fs::remove_dir(&folder);
+            })
         })
     }
 
@@ -145,8 +157,7 @@ impl Desk {
         self.start()?;
         let mut session = self.session.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(session) = &*session {
-            session.check_idle()?;
-            session.release_locks();
+            session.close()?;
         }
         *session = None;
         drop(session);
@@ -217,6 +228,23 @@ mod tests {
     }
 
     #[test]
+    fn the_name_of_a_project_that_cannot_be_created_stays_free() {
+        let folder = tempfile::tempdir().unwrap();
+        let desk = Desk::of_start(Start {
+            recent: None,
+            folder: folder.path().to_owned(),
+            pixel_frame: PixelFrame::Upright,
+            photo_size: Some([60, 40]),
+            open: Box::new(|_: &Path| Err("the disk is full".into())),
+        });
+        let create = |width: u32| desk.create("rod", "photo.png", &png(&RgbImage::new(width, 40)).unwrap());
+        let refused = create(50).err().unwrap().to_string();
+        assert!(refused.starts_with("photo.png: expected 60 × 40 pixels"), "{refused}");
+        assert!(create(60).err().unwrap().to_string().contains("the disk is full"));
+        assert!(!folder.path().join("rod").exists());
+    }
+
+    #[test]
     fn a_closed_project_is_unlocked_although_a_search_still_uses_it() {
         let lock = |project: &Path| WriterLock::take(&project.join("sdg-project.json"));
         let open = move |path: &Path| {
@@ -225,7 +253,8 @@ mod tests {
         };
         let folder = tempfile::tempdir().unwrap();
         let (project, pixel_frame) = (folder.path().join("rod"), PixelFrame::Upright);
-        let start = Start { recent: None, folder: folder.path().to_owned(), pixel_frame, open: Box::new(open) };
+        let folder_path = folder.path().to_owned();
+        let start = Start { recent: None, folder: folder_path, pixel_frame, photo_size: None, open: Box::new(open) };
         let desk = Desk::of_start(start);
         desk.create("rod", "photo.png", &png(&RgbImage::new(60, 40)).unwrap()).unwrap();
         let search = desk.session();

@@ -41,6 +41,12 @@ pub enum Error {
     /// Another photo has its marks in the same file.
     #[error("{name}: expected a file of its own for the marks, found {}, the file of {other}", path.display())]
     SharedMarks { name: String, path: PathBuf, other: String },
+    /// A picture has another size than those of the calibrated camera.
+    #[error(
+        "{name}: expected {} × {} pixels, as the camera was calibrated, found {} × {}",
+        expected[0], expected[1], found[0], found[1]
+    )]
+    OtherSize { name: String, expected: [u32; 2], found: [u32; 2] },
     /// No picture of that number.
     #[error("expected a picture numbered below {count} that is still there, found {id}")]
     NoSuchPicture { id: usize, count: usize },
@@ -78,6 +84,9 @@ pub enum Error {
     /// The page's state does not allow the request.
     #[error("{0}")]
     Busy(&'static str),
+    /// Another program changed the marks of a photo; they were read again.
+    #[error("another program changed these marks; they were read again, without the change here")]
+    MarksChanged,
     /// Nothing has been taught yet.
     #[error("expected a taught model, found none: teach one first")]
     NotTaught,

@@ -1,7 +1,7 @@
 //! Live pictures from any implementation of [`LivePictures`].
 //!
 //! Frames shown on the page are kept for a while: a photo is the frame that the person saw, and detections are drawn on
-//! the frame in which they were found.
+//! the frame in which they were found. A page that pauses holds its frame, so that other pages do not displace it.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// Number of shown frames that are kept: several for each open page.
+/// Number of shown frames that are kept, several for each open page; and of held ones.
 const MAX_KEPT: usize = 8;
 
 /// A camera as used by the page.
@@ -96,7 +96,30 @@ pub struct LiveOptions {
 #[derive(Debug)]
 pub(crate) struct LiveDesk {
     pub(crate) options: LiveOptions,
-    kept: Mutex<VecDeque<LiveFrame>>,
+    kept: Mutex<Kept>,
+}
+
+/// The last shown frames, and the last held ones.
+#[derive(Debug, Default)]
+struct Kept {
+    shown: VecDeque<LiveFrame>,
+    held: VecDeque<LiveFrame>,
+}
+
+impl Kept {
+    fn find(&self, number: u64) -> Result<&LiveFrame> {
+        let mut frames = self.shown.iter().chain(&self.held);
+        frames.find(|frame| frame.number == number).ok_or(Error::NoSuchFrame { number })
+    }
+}
+
+fn push(frames: &mut VecDeque<LiveFrame>, frame: LiveFrame) {
+    if frames.iter().all(|known| known.number != frame.number) {
+        frames.push_back(frame);
+    }
+    if frames.len() > MAX_KEPT {
+        frames.pop_front();
+    }
 }
 
 impl LiveDesk {
@@ -104,7 +127,7 @@ impl LiveDesk {
         Self { options, kept: Mutex::default() }
     }
 
-    fn kept(&self) -> MutexGuard<'_, VecDeque<LiveFrame>> {
+    fn kept(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -112,15 +135,20 @@ impl LiveDesk {
     pub(crate) fn newest(&self) -> Live {
         let live = self.options.pictures.newest();
         if let Some(frame) = &live.frame {
-            let mut kept = self.kept();
-            if kept.iter().all(|known| known.number != frame.number) {
-                kept.push_back(frame.clone());
-            }
-            if kept.len() > MAX_KEPT {
-                kept.pop_front();
-            }
+            push(&mut self.kept().shown, frame.clone());
         }
         live
+    }
+
+    /// Keeps a shown frame beyond those shown later, until [`MAX_KEPT`] others are held.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    pub(crate) fn hold(&self, number: u64) -> Result<()> {
+        let mut kept = self.kept();
+        let frame = kept.find(number)?.clone();
+        push(&mut kept.held, frame);
+        Ok(())
     }
 
     /// The picture of a shown frame.
@@ -128,9 +156,7 @@ impl LiveDesk {
     /// # Errors
     /// [`Error::NoSuchFrame`] if it is no longer kept.
     pub(crate) fn frame(&self, number: u64) -> Result<Arc<RgbImage>> {
-        let kept = self.kept();
-        let frame = kept.iter().find(|frame| frame.number == number).ok_or(Error::NoSuchFrame { number })?;
-        Ok(Arc::clone(&frame.picture))
+        Ok(Arc::clone(&self.kept().find(number)?.picture))
     }
 
     /// The picture of a shown frame, for use as a photo.
@@ -188,6 +214,20 @@ mod tests {
         assert_eq!(desk.frame(2).unwrap().get_pixel(0, 0)[0], 2);
         assert!(desk.frame(9).is_ok());
         assert!(desk.frame(10).is_err(), "this frame was never shown");
+    }
+
+    #[test]
+    fn a_held_frame_stays_while_another_page_shows_the_next_ones() {
+        let (desk, still) = desk();
+        for number in 0..20 {
+            show(&still, number);
+            desk.newest();
+            if number == 3 {
+                desk.hold(3).unwrap();
+            }
+        }
+        assert_eq!(desk.frame(3).unwrap().get_pixel(0, 0)[0], 3);
+        assert!(desk.frame(4).is_err() && desk.hold(4).is_err());
     }
 
     #[test]

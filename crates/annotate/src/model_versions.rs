@@ -5,6 +5,7 @@
 //! pendulum.sdg                           the version in use
 //! models/pendulum-C-20261123-203107.sdg  a teaching's file
 //! models/pendulum-20261120-081500.sdg    the former pendulum.sdg, if no teaching here made it
+//! pendulum-2.sdg                         the version in use, if pendulum.sdg is that of another project in this folder
 //! ```
 //!
 //! If the user gives a file in another folder for the model, `models/` is there, too; both folders may be moved. A
@@ -46,6 +47,10 @@ pub struct Version {
     pub symmetry: Option<u32>,
     #[serde(default)]
     pub fixed_height: Option<bool>,
+    /// Heights of the marks and of the grasp above the table, in metres; `None` without a calibrated camera, and in
+    /// files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights_m: Option<[f64; 2]>,
 }
 
 /// All versions, oldest first.
@@ -94,44 +99,85 @@ impl ModelVersions {
         absolute(&self.default_folder).parent().map(Path::to_owned).unwrap_or_default()
     }
 
-    /// Writes a new version under its own name and makes it the one in use, at `path`.
+    /// Writes a new version under its own name and makes it the one in use, at `path` or, if that is the model in use
+    /// of another project, at a numbered path. Returns this path.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<()> {
+    pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<PathBuf> {
         fs::create_dir_all(&self.folder).map_err(Error::file(&self.folder, "cannot make this folder"))?;
-        self.keep_foreign(path)?;
-        let name = format!("{}-{}-{}.sdg", stem(path), version.summary.model, stamp(version.taught_secs));
+        let path = self.own_path(path)?;
+        self.keep_foreign(&path)?;
+        let name = format!("{}-{}-{}.sdg", stem(&path), version.summary.model, stamp(version.taught_secs));
         let file = free_numbered(&self.folder.join(name));
         write_atomically(&file, bytes)?;
-        write_atomically(path, bytes)?;
+        write_atomically(&path, bytes)?;
         let file = match file.strip_prefix(&self.default_folder) {
             Ok(name) => name.to_string_lossy().into_owned(),
             Err(_) => relative(&self.project(), &absolute(&file)),
         };
         self.versions.push(Version { file, ..version });
         self.current = Some(self.versions.len() - 1);
-        Ok(())
+        Ok(path)
     }
 
-    /// Makes a version the one in use.
+    /// Makes a version the one in use, at the path that [`Self::keep`] would use.
     ///
     /// # Errors
     /// Unknown version, or files cannot be read or written.
     pub fn use_version(&mut self, path: &Path, id: usize) -> Result<Vec<u8>> {
         let bytes = self.read(id)?;
-        self.keep_foreign(path)?;
-        write_atomically(path, &bytes)?;
+        let path = self.own_path(path)?;
+        self.keep_foreign(&path)?;
+        write_atomically(&path, &bytes)?;
         self.current = Some(id);
         Ok(bytes)
+    }
+
+    /// Writes the version in use, if it can be read, to `path` as well, unless a file that is no version is there.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_current(&self, path: &Path) -> Result<()> {
+        let Some(Ok(bytes)) = self.current.map(|id| self.read(id)) else { return Ok(()) };
+        if path.exists() && !fs::read(path).is_ok_and(|standing| self.is_version(&standing)) {
+            return Ok(());
+        }
+        Ok(write_atomically(path, &bytes)?)
+    }
+
+    /// Whether a file has the content of a version, the newest first.
+    fn is_version(&self, content: &[u8]) -> bool {
+        (0..self.versions.len()).rev().any(|id| self.read(id).is_ok_and(|bytes| bytes == content))
+    }
+
+    /// `path`, or the first numbered path that is not the model in use of another project in the folder: no version,
+    /// although the folder of versions has a file with the same content.
+    fn own_path(&self, path: &Path) -> Result<PathBuf> {
+        let is_in_folder = |content: &[u8]| {
+            let paths = fs::read_dir(&self.folder).into_iter().flatten().flatten().map(|entry| entry.path());
+            let is_same_size = |path: &PathBuf| fs::metadata(path).is_ok_and(|file| file.len() == content.len() as u64);
+            paths.filter(is_same_size).any(|path| fs::read(path).is_ok_and(|bytes| bytes == content))
+        };
+        let mut own = path.to_owned();
+        for number in 2.. {
+            if !own.exists() {
+                break;
+            }
+            let standing = fs::read(&own).map_err(Error::file(&own, "cannot read"))?;
+            if self.is_version(&standing) || !is_in_folder(&standing) {
+                break;
+            }
+            own = path.with_file_name(format!("{}-{number}.sdg", stem(path)));
+        }
+        Ok(own)
     }
 
     /// Copies the file at `path` into the folder of versions, unless it is a known version.
     fn keep_foreign(&self, path: &Path) -> Result<()> {
         let Ok(metadata) = fs::metadata(path) else { return Ok(()) };
         let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
-        let is_kept = (0..self.versions.len()).rev().any(|id| self.read(id).is_ok_and(|bytes| bytes == standing));
-        if is_kept {
+        if self.is_version(&standing) {
             return Ok(());
         }
         let written = metadata.modified().unwrap_or(UNIX_EPOCH).duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -183,8 +229,17 @@ mod tests {
     fn version(taught_secs: u64) -> Version {
         let summary =
             TaughtSummary { model: ModelKind::S, object: "rod".into(), seconds: 1.0, figures: None, negatives: None };
-        let (file, material) = (String::new(), fingerprint("marks"));
-        Version { file, taught_secs, summary, photos: 1, negatives: 0, material, symmetry: None, fixed_height: None }
+        Version {
+            file: String::new(),
+            taught_secs,
+            summary,
+            photos: 1,
+            negatives: 0,
+            material: fingerprint("marks"),
+            symmetry: None,
+            fixed_height: None,
+            heights_m: None,
+        }
     }
 
     #[test]
@@ -218,5 +273,24 @@ mod tests {
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), versions.current), ("first", Some(0)));
         assert_eq!(texts().len(), 3, "a version that is kept already is not copied again");
         assert!(versions.use_version(&path, 2).unwrap_err().to_string().contains("below 2, found 2"));
+    }
+
+    #[test]
+    fn the_model_in_use_of_another_project_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let versions = || ModelVersions { folder: at("models"), default_folder: at("models"), ..Default::default() };
+        let (mut one, mut other) = (versions(), versions());
+        assert_eq!(one.keep(&at("rod.sdg"), b"first", version(60)).unwrap(), at("rod.sdg"));
+        assert_eq!(other.keep(&at("rod.sdg"), b"second", version(60)).unwrap(), at("rod-2.sdg"));
+        assert_eq!(other.keep(&at("rod.sdg"), b"third", version(60)).unwrap(), at("rod-2.sdg"));
+        other.use_version(&at("rod.sdg"), 0).unwrap();
+        let texts = ["rod.sdg", "rod-2.sdg"].map(|name| fs::read_to_string(at(name)).unwrap());
+        assert_eq!(texts, ["first", "second"]);
+        // A part with another name has its model there, too, unless that is the name of another file.
+        other.write_current(&at("bar.sdg")).unwrap();
+        other.write_current(&at("rod.sdg")).unwrap();
+        let texts = ["bar.sdg", "rod.sdg"].map(|name| fs::read_to_string(at(name)).unwrap());
+        assert_eq!(texts, ["second", "first"]);
     }
 }

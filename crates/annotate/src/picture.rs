@@ -45,15 +45,26 @@ impl Picture {
         Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()], frame })
     }
 
-    /// Decodes a photo's bytes once, so that invalid photos are rejected before they are written.
+    /// Decodes a photo's bytes once, so that invalid photos are rejected before they are written. `size` is that of a
+    /// calibrated camera's pictures.
     ///
     /// # Errors
-    /// The bytes are not a picture, or an Exif orientation rotates a photo of a calibrated camera.
-    pub fn check_photo(bytes: &[u8], name: &str, frame: PixelFrame) -> Result<()> {
+    /// The bytes are not a picture, or an Exif orientation rotates a photo of a calibrated camera or it has another
+    /// size.
+    pub fn check_photo(bytes: &[u8], name: &str, frame: PixelFrame, size: Option<[u32; 2]>) -> Result<()> {
         if frame == PixelFrame::Sensor {
             check_is_not_turned(bytes, name)?;
         }
-        decode(bytes, name, frame).map(|_| ())
+        let image = decode(bytes, name, frame)?;
+        check_size([image.width(), image.height()], name, size)
+    }
+
+    /// Checks that the picture can be from the calibrated camera, whose pictures have the size `expected`.
+    ///
+    /// # Errors
+    /// The picture has another size.
+    pub fn check_size(&self, expected: Option<[u32; 2]>) -> Result<()> {
+        check_size(self.size, &self.name, expected)
     }
 
     /// Checks that the picture can be a photo with marks: if an Exif orientation rotates a picture of a calibrated
@@ -166,6 +177,13 @@ fn decode(bytes: &[u8], name: &str, frame: PixelFrame) -> Result<RgbImage> {
 
 fn check_is_not_turned(bytes: &[u8], name: &str) -> Result<()> {
     if is_turned_by_exif(bytes) { Err(refused(name, PictureError::TurnedByExif)) } else { Ok(()) }
+}
+
+fn check_size(found: [u32; 2], name: &str, expected: Option<[u32; 2]>) -> Result<()> {
+    match expected.filter(|expected| *expected != found) {
+        Some(expected) => Err(Error::OtherSize { name: name.to_owned(), expected, found }),
+        None => Ok(()),
+    }
 }
 
 fn refused(name: &str, source: PictureError) -> Error {

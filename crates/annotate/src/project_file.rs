@@ -167,8 +167,15 @@ impl Gone {
     }
 
     /// Adds a note that a picture is left out.
-    pub fn leave_out(&mut self, error: &Error) {
+    fn leave_out(&mut self, error: &Error) {
         self.notes.push(format!("{error}; this picture is left out."));
+    }
+
+    /// Like [`Self::leave_out`], with the picture's name unless the error begins with it.
+    pub fn leave_out_named(&mut self, name: &str, error: &Error) {
+        let text = error.to_string();
+        let name = if text.starts_with(name) { String::new() } else { format!("{name}: ") };
+        self.notes.push(format!("{name}{text}; this picture is left out."));
     }
 }
 
@@ -291,7 +298,7 @@ impl ProjectFile {
                 Err(error) => {
                     // The marks of a photo that an Exif orientation rotates may name its upright size.
                     picture.check_is_markable()?;
-                    gone.notes.push(format!("{}: {error}; this picture is left out.", picture.name));
+                    gone.leave_out_named(&picture.name, &error);
                     continue;
                 }
             };

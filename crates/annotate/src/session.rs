@@ -3,28 +3,27 @@
 //! Requests name pictures by their index in a list of the session. The page never sends a path.
 
 mod folder;
+mod models;
 mod opening;
 mod tried;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sdg_demonstration::{Demonstration, ModelKind, PixelFrame};
+use sdg_demonstration::{Demonstration, PixelFrame};
 use sdg_files::WriterLock;
 use tempfile::TempDir;
 
 use crate::error::{Error, Result};
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
-use crate::model_versions::{Version, now_secs};
 use crate::names::{file_name, free_numbered_except, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::ProjectPlace;
-use crate::region::{Region, Searched};
 use crate::session_state::State;
-use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
-use crate::teaching::{News, Teaching};
+use crate::teacher::GraspTeacher;
+use crate::teaching::Teaching;
 use crate::views::{ImageView, Saved, SessionView};
 
 /// Maximum length of an object's name.
@@ -50,10 +49,19 @@ pub struct SessionOptions {
     pub max_opening_px: Option<f64>,
     /// Orientation of the pixels of all pictures: the sensor's with a camera's calibration.
     pub pixel_frame: PixelFrame,
+    /// Width and height of photos; `None` without a camera's calibration.
+    pub photo_size: Option<[u32; 2]>,
+    /// Heights of the marks and of the grasp above the table, in metres; `None` without a camera's calibration.
+    pub heights_m: Option<[f64; 2]>,
 }
 
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The file of the model in use, named after the part, beside `home`.
+fn model_file(home: &Path, label: &str) -> PathBuf {
+    home.with_file_name(format!("{}.sdg", safe_stem(label)))
 }
 
 /// The name of a part without surrounding spaces.
@@ -76,7 +84,7 @@ pub(crate) fn check_label(label: &str) -> Result<&str> {
 /// A session of the page.
 ///
 /// The session calls teaching and previews, which never call the session. While the lock on `state` is held, only the
-/// locks on `locks` and on the teaching's model are taken, never the reverse.
+/// locks on `locks` and those of the teaching are taken, never the reverse.
 pub struct Session {
     teacher: Arc<dyn GraspTeacher>,
     teaching: Arc<Teaching>,
@@ -142,10 +150,15 @@ impl Session {
         self.locks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Releases the locks when the project is closed: the session may remain in use by a running search, and the same
+    /// Closes the project and releases its locks: the session may remain in use by a running search, and the same
     /// project can be opened again at once.
-    pub(crate) fn release_locks(&self) {
+    ///
+    /// # Errors
+    /// A teaching is running.
+    pub(crate) fn close(&self) -> Result<()> {
+        self.teaching.close()?;
         self.locks().clear();
+        Ok(())
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -174,57 +187,67 @@ impl Session {
         }
     }
 
-    fn model_path(&self, state: &State) -> PathBuf {
-        self.model_path.clone().unwrap_or_else(|| {
-            let name = format!("{}.sdg", safe_stem(&state.label));
-            self.home.with_file_name(name)
-        })
+    /// A picture of the object, for the page.
+    ///
+    /// # Errors
+    /// Unknown picture.
+    pub(crate) fn image_view(&self, id: usize) -> Result<ImageView> {
+        let state = self.state();
+        state.image(id)?;
+        Ok(state.image_view(id))
     }
 
     /// Stores new marks of a picture, and writes them to the file if they are valid.
     ///
     /// # Errors
-    /// Unknown picture, or another process has locked or changed its marks.
+    /// Unknown picture, or another process has locked its marks. [`Error::MarksChanged`] if another process has changed
+    /// them: [`Self::image_view`] then has the marks of the file.
     pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
-        let photo = state.image(id)?.picture.path.clone();
-        if self.lock_marks(&mut state, &photo)? {
-            return Err(Error::Busy(
-                "another program changed these marks; they were read again, without the change here",
-            ));
+        state.image(id)?;
+        if self.lock_marks_of(&mut state, id)? {
+            return Err(Error::MarksChanged);
         }
         state.images[id].marks = marks;
         state.save(id);
         Ok(state.image_view(id))
     }
 
-    /// Renames the object, also in all files already written.
+    /// Renames the object, also in all files already written. The model in use is also written under the new name,
+    /// unless another file has that name.
     ///
     /// # Errors
-    /// The name is empty, too long or contains control characters, the project cannot be written, or another process
-    /// has locked the marks of a photo, in which the name then stays.
+    /// The name is empty, too long or contains control characters, the model or the project cannot be written, or
+    /// another process has locked the marks of a photo; then no file has the new name.
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = check_label(label)?;
         let mut state = self.state();
+        let is_written = |id: &usize| matches!(state.images[*id].saved, Saved::Written { .. });
+        let ids: Vec<usize> = state.image_ids().filter(is_written).collect();
+        // The locks of all photos of a large project would be more files than a process can open.
+        let num_locks = self.locks().len();
+        for &id in &ids {
+            self.lock_marks_of(&mut state, id)?;
+            self.locks().truncate(num_locks);
+        }
+        if self.model_path.is_none() && !state.is_model_lost {
+            state.models.write_current(&model_file(&self.home, label))?;
+        }
         label.clone_into(&mut state.label);
         state.is_named = true;
         state.save_project()?;
-        let mut renamed = Ok(());
-        let num_locks = self.locks().len();
-        for id in state.image_ids().collect::<Vec<_>>() {
-            if matches!(state.images[id].saved, Saved::Written { .. }) {
-                let photo = state.images[id].picture.path.clone();
-                match self.lock_marks(&mut state, &photo) {
-                    Ok(_) => state.save(id),
-                    Err(error) => renamed = Err(error),
-                }
-                // The locks of all photos of a large project would be more files than a process can open.
-                self.locks().truncate(num_locks);
-            }
+        for id in ids {
+            self.lock_marks_of(&mut state, id)?;
+            state.save(id);
+            self.locks().truncate(num_locks);
         }
         drop(state);
-        renamed?;
         Ok(self.view())
+    }
+
+    fn lock_marks_of(&self, state: &mut State, id: usize) -> Result<bool> {
+        let photo = state.images[id].picture.path.clone();
+        self.lock_marks(state, &photo)
     }
 
     /// A marked picture's file.
@@ -266,63 +289,6 @@ impl Session {
         state.images[id].is_removed = false;
         state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|t| t.is_absent = false);
         state.save_project()
-    }
-
-    /// Makes a version the model in use, and copies it to the model's file.
-    ///
-    /// # Errors
-    /// Unknown version, its file cannot be read, a file cannot be written, or a teaching is running.
-    pub fn use_version(&self, id: usize) -> Result<()> {
-        self.teaching.check_idle()?;
-        let mut state = self.state();
-        let path = self.model_path(&state);
-        let summary = state.models.get(id)?.summary.clone();
-        let bytes = state.models.read(id)?;
-        let open = |searched| self.teacher.open(&bytes, &summary, searched);
-        // The version's own region may not fit the camera's pictures; then the page's applies.
-        let opened = open(None).or_else(|_| open(Some(Searched::of(state.region))));
-        let model = opened.map_err(Error::Teacher)?;
-        state.models.use_version(&path, id)?;
-        state.region = model.region();
-        state.is_model_lost = false;
-        self.teaching.set_model(Arc::from(model));
-        state.save_project()
-    }
-
-    /// Restricts the search to a region, for the model in use and for models taught later; `None` for the whole
-    /// picture.
-    ///
-    /// # Errors
-    /// The region is invalid, the model cannot search it, or (without a model) the marked part does not fit into it; a
-    /// teaching is running; the project cannot be written.
-    pub fn set_region(&self, region: Option<Region>) -> Result<()> {
-        self.teaching.check_idle()?;
-        if let Some(region) = &region {
-            region.check()?;
-        }
-        if let Ok(model) = self.teaching.model() {
-            model.look_in(region).map_err(Error::Teacher)?;
-        } else if let Some(region) = &region {
-            self.check_fits(region)?;
-        }
-        let mut state = self.state();
-        state.region = region;
-        state.save_project()
-    }
-
-    /// Whether the part on all marked photos fits into a region.
-    fn check_fits(&self, region: &Region) -> Result<()> {
-        let (label, marked) = {
-            let state = self.state();
-            let marked: Vec<_> = state.image_ids().map(|id| state.images[id].clone()).collect();
-            (state.label.clone(), marked)
-        };
-        // Incomplete marks are skipped.
-        let demonstrations: Vec<_> = marked.iter().filter_map(|image| image.demonstration(&label).ok()).collect();
-        if demonstrations.is_empty() {
-            return Ok(());
-        }
-        self.teacher.check_region(region, &demonstrations).map_err(Error::Teacher)
     }
 
     /// The camera.
@@ -384,84 +350,5 @@ impl Session {
         };
         let key = SampleKey { image_id: id, marks: marked.marks.clone(), seed };
         self.previews.sample(key, || marked.demonstration(&label), index)
-    }
-
-    /// Starts teaching from all marked pictures; [`teaching_news`](Self::teaching_news) gives the progress.
-    ///
-    /// # Errors
-    /// An invalid request, a running teaching, or insufficient marks.
-    pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
-        request.check()?;
-        self.teaching.check_idle()?;
-        // The pictures are decoded without the lock: marks that change meanwhile make the model stale.
-        let (marked, label, negatives, fingerprint, model_path, region) = {
-            let state = self.state();
-            let negatives: Vec<_> = state.negatives().cloned().collect();
-            let label = state.label.clone();
-            let model_path = self.model_path(&state);
-            (state.demonstrated(request.model)?, label, negatives, state.material(), model_path, state.region)
-        };
-        let request = TeachRequest { region, ..request };
-        let demonstrations = marked.iter().map(|image| image.demonstration(&label)).collect::<Result<Vec<_>>>()?;
-        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
-        let [photos, num_negatives] = [demonstrations.len(), negatives.len()];
-        let material = TeachingMaterial { demonstrations, negatives };
-        let (symmetry, fixed_height) = (Some(request.symmetry), Some(request.fixed_height));
-        let state = Arc::clone(&self.state);
-        let keep = move |model: &dyn TaughtModel| {
-            let bytes = model.to_bytes().map_err(Error::Teacher)?;
-            let version = Version {
-                file: String::new(),
-                taught_secs: now_secs(),
-                summary: model.summary(),
-                photos,
-                negatives: num_negatives,
-                material: fingerprint,
-                symmetry,
-                fixed_height,
-            };
-            let mut state = locked(&state);
-            state.models.keep(&model_path, &bytes, version)?;
-            state.is_model_lost = false;
-            state.save_project()?;
-            Ok(model_path)
-        };
-        self.teaching.start(Arc::clone(&self.teacher), request, material, keep)
-    }
-
-    /// # Errors
-    /// A teaching is running.
-    pub(crate) fn check_idle(&self) -> Result<()> {
-        self.teaching.check_idle()
-    }
-
-    /// State of the teaching, for the page.
-    pub fn teaching_news(&self) -> News {
-        self.teaching.news()
-    }
-
-    /// Asks a running teaching to end with its current result.
-    pub fn stop_teaching(&self) {
-        self.teaching.stop();
-    }
-
-    /// The model in use: the one taught last, or a version read from its file.
-    ///
-    /// # Errors
-    /// [`Error::NotTaught`].
-    pub fn taught_model(&self) -> Result<Arc<dyn TaughtModel>> {
-        self.teaching.model()
-    }
-
-    /// The demonstrations for teaching `model`. Pictures without any mark are left out.
-    ///
-    /// # Errors
-    /// No picture is marked, or a picture has marks but lacks some that `model` needs.
-    pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
-        let (label, marked) = {
-            let state = self.state();
-            (state.label.clone(), state.demonstrated(model)?)
-        };
-        marked.iter().map(|image| image.demonstration(&label)).collect()
     }
 }

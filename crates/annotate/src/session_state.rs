@@ -43,6 +43,10 @@ pub struct State {
     pub offered: Vec<PathBuf>,
     /// The hand's maximum opening in pixels, if a calibrated camera gives it.
     pub max_opening_px: Option<f64>,
+    /// Width and height of photos, if a calibrated camera gives them.
+    pub photo_size: Option<[u32; 2]>,
+    /// Heights of the marks and of the grasp above the table, in metres, if the camera is calibrated.
+    pub heights_m: Option<[f64; 2]>,
     /// The region searched by the model in use, and by the next one.
     pub region: Option<Region>,
     /// The file of the model in use cannot be read.
@@ -69,6 +73,8 @@ pub struct TrialPicture {
     pub uploaded: bool,
     /// The number of the marked picture that it became, which may have been removed since: [`State::became`].
     pub became: Option<usize>,
+    /// The photo's name in the project's file, if the photo is missing now.
+    pub missing_photo: Option<String>,
     /// The user stated that the part is not there.
     pub is_absent: bool,
     pub is_removed: bool,
@@ -77,7 +83,7 @@ pub struct TrialPicture {
 impl TrialPicture {
     /// A picture without statements of the user.
     pub fn new(picture: Picture, uploaded: bool) -> Self {
-        Self { picture, uploaded, became: None, is_absent: false, is_removed: false }
+        Self { picture, uploaded, became: None, missing_photo: None, is_absent: false, is_removed: false }
     }
 }
 
@@ -102,7 +108,7 @@ impl State {
     ///
     /// # Errors
     /// The picture is a photo already, the file beside it contains no marks of it or belongs to another photo, or an
-    /// Exif orientation rotates a photo of a calibrated camera.
+    /// Exif orientation rotates a photo of a calibrated camera or it has another size.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let known = self.image_at(&picture.path);
         let mut image = match known.map(|id| &self.images[id]) {
@@ -133,8 +139,9 @@ impl State {
     /// that file.
     ///
     /// # Errors
-    /// As [`MarkedPicture::of`].
+    /// As [`MarkedPicture::of`], or a photo of a calibrated camera has another size.
     pub fn open_photo(&self, picture: Picture) -> Result<(MarkedPicture, Option<String>)> {
+        picture.check_size(self.photo_size)?;
         let file = self.marks_file(&picture.path);
         MarkedPicture::of(picture, file.as_deref())
     }
@@ -244,6 +251,12 @@ impl State {
         fingerprint(&rounded(&(marked, negatives)).to_string())
     }
 
+    /// Whether a version was taught with other heights above the table; their last digits may differ after reading.
+    fn has_other_heights(&self, version: &Version) -> bool {
+        let heights = version.heights_m.zip(self.heights_m);
+        heights.is_some_and(|(taught, now)| taught.iter().zip(now).any(|(taught, now)| (taught - now).abs() > 1e-6))
+    }
+
     pub fn model_views(&self) -> Vec<ModelView> {
         let material = self.material();
         let view = |(id, version): (usize, &Version)| ModelView {
@@ -254,7 +267,7 @@ impl State {
             photos: version.photos,
             negatives: version.negatives,
             is_current: self.models.current == Some(id) && !self.is_model_lost,
-            is_stale: version.material != material,
+            is_stale: version.material != material || self.has_other_heights(version),
             symmetry: version.symmetry,
             fixed_height: version.fixed_height,
         };
@@ -281,11 +294,12 @@ impl State {
         };
         for id in self.trial_ids() {
             let trial = &self.trial_pictures[id];
+            let became = self.became(id).map(|id| name(&self.images[id].picture));
             file.tried.push(Tried {
                 file: name(&trial.picture),
                 name: trial.picture.name.clone(),
                 absent: trial.is_absent,
-                became: self.became(id).map(|id| name(&self.images[id].picture)),
+                became: became.or_else(|| trial.missing_photo.clone()),
             });
         }
         file.keep_missing(&self.gone);

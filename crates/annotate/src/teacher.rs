@@ -65,6 +65,8 @@ pub struct TeachingMaterial {
     pub demonstrations: Vec<Demonstration>,
     /// Pictures without the part.
     pub negatives: Vec<RgbImage>,
+    /// The names of these pictures, for errors.
+    pub negative_names: Vec<String>,
 }
 
 /// A model that detects the part.

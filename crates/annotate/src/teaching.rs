@@ -86,7 +86,9 @@ impl Pace {
 /// The teaching runs of a session; one at a time.
 #[derive(Default)]
 pub struct Teaching {
+    /// The lock is held when `is_closed` is set or read.
     news: Mutex<News>,
+    is_closed: AtomicBool,
     stop: AtomicBool,
     model: Mutex<Option<Arc<dyn TaughtModel>>>,
 }
@@ -151,27 +153,72 @@ impl Teaching {
         idle(&locked(&self.news))
     }
 
-    /// Starts a teaching run on a thread; `keep` writes the model and returns its path. `news` gives the progress.
+    /// Ends the use of this value: no teaching run starts any more.
     ///
     /// # Errors
     /// [`Error::Busy`] while a teaching run is in progress.
+    pub fn close(&self) -> Result<()> {
+        let news = locked(&self.news);
+        idle(&news)?;
+        self.is_closed.store(true, Ordering::SeqCst);
+        Ok(())
+    }
+
+    /// Begins a teaching run whose pictures are still to be read: from now on it is in progress.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] while a teaching run is in progress, or after [`Self::close`].
+    pub fn prepare(self: &Arc<Self>, model: ModelKind) -> Result<Preparation> {
+        let mut news = locked(&self.news);
+        idle(&news)?;
+        if self.is_closed.load(Ordering::SeqCst) {
+            return Err(Error::Busy("this project was closed: load the page again"));
+        }
+        self.stop.store(false, Ordering::SeqCst);
+        let begun = News { status: Status::Running, model: Some(model), ..News::default() };
+        let before = std::mem::replace(&mut *news, begun);
+        Ok(Preparation { teaching: Arc::clone(self), before: Some(before) })
+    }
+
+    /// Sets the model that [`Self::model`] returns, such as one read from a file.
+    pub fn set_model(&self, model: Arc<dyn TaughtModel>) {
+        *locked(&self.model) = Some(model);
+    }
+}
+
+/// A teaching run that is in progress and not yet on its thread. If this value is dropped without
+/// [`start`](Self::start), the news are those before the run.
+pub struct Preparation {
+    teaching: Arc<Teaching>,
+    /// The news before the run; `None` after its start.
+    before: Option<News>,
+}
+
+impl Drop for Preparation {
+    fn drop(&mut self) {
+        if let Some(before) = self.before.take() {
+            *locked(&self.teaching.news) = before;
+        }
+    }
+}
+
+impl Preparation {
+    /// Starts the teaching run on a thread; `keep` writes the model and returns its path. [`Teaching::news`] gives the
+    /// progress.
     pub fn start(
-        self: &Arc<Self>,
+        mut self,
         teacher: Arc<dyn GraspTeacher>,
         request: TeachRequest,
         material: TeachingMaterial,
         keep: impl FnOnce(&dyn TaughtModel) -> Result<PathBuf> + Send + 'static,
-    ) -> Result<News> {
-        let mut news = locked(&self.news);
-        idle(&news)?;
-        let (photos, negatives) = (material.demonstrations.len(), material.negatives.len());
-        let model = Some(request.model);
-        *news = News { status: Status::Running, model, photos, negatives, ..News::default() };
-        self.stop.store(false, Ordering::SeqCst);
-        let begun = news.clone();
-        drop(news);
-
-        let teaching = Arc::clone(self);
+    ) -> News {
+        self.before = None;
+        let teaching = Arc::clone(&self.teaching);
+        let begun = {
+            let mut news = locked(&teaching.news);
+            (news.photos, news.negatives) = (material.demonstrations.len(), material.negatives.len());
+            news.clone()
+        };
         std::thread::spawn(move || {
             let start = Instant::now();
             let mut pace = Pace { stride: 1, since_secs: 0.0, since_done: 0 };
@@ -199,12 +246,7 @@ impl Teaching {
                 }
             }
         });
-        Ok(begun)
-    }
-
-    /// Sets the model that [`Self::model`] returns, such as one read from a file.
-    pub fn set_model(&self, model: Arc<dyn TaughtModel>) {
-        *locked(&self.model) = Some(model);
+        begun
     }
 }
 
@@ -235,6 +277,18 @@ mod tests {
         assert_eq!(left_after("the network", true, 1), None);
         assert!(left_after("the network", true, 2).is_some());
         assert_eq!(left_after("the network", true, 3), None);
+    }
+
+    #[test]
+    fn a_teaching_is_in_progress_while_it_is_prepared() {
+        let teaching = Arc::new(Teaching::default());
+        let preparation = teaching.prepare(ModelKind::S).unwrap();
+        assert!(teaching.check_idle().is_err() && teaching.close().is_err());
+        assert!(teaching.prepare(ModelKind::S).is_err());
+        drop(preparation);
+        assert_eq!(teaching.news(), News::default());
+        teaching.close().unwrap();
+        assert!(teaching.prepare(ModelKind::S).is_err(), "the project is closed");
     }
 
     #[test]

@@ -82,7 +82,7 @@ pub struct ModelView {
     pub negatives: usize,
     /// Whether this version is in use.
     pub is_current: bool,
-    /// Whether marks, photos or negatives have changed since its teaching.
+    /// Whether marks, photos, negatives or heights above the table have changed since its teaching.
     pub is_stale: bool,
     /// Number of equivalent turns in a full rotation, 0 for any turn; `None` if an earlier program taught it.
     pub symmetry: Option<u32>,

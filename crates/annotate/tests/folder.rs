@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::served::{InPlace, Served, photo, photo_png};
 use image::codecs::png::PngEncoder;
 use image::{ImageEncoder, RgbImage};
-use sdg_annotate::{Marks, Session, SessionOptions};
+use sdg_annotate::{Marks, Session, SessionOptions, Status};
 use sdg_demonstration::PixelFrame;
 use serde_json::{Value, json};
 
@@ -127,6 +127,61 @@ fn no_file_beside_a_picture_keeps_the_project_from_opening() {
     let note = first["notes"][0].as_str().unwrap();
     assert!(note.starts_with("broken.png: ") && note.contains("broken.json"), "{}", first["notes"]);
     assert_eq!(first["notes"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_photo_of_the_project_whose_marks_do_not_fit_is_left_out() {
+    let folder = folder_of(&["rod.png", "other.png"]);
+    for name in ["rod.json", "other.json"] {
+        std::fs::write(folder.path().join(name), LABELME).unwrap();
+    }
+    let served = Served::of_project(folder);
+    assert_eq!(names(&session(&served)["images"]), ["other.png", "rod.png"]);
+    let folder = served.end();
+    let smaller = LABELME.replace(r#""imageWidth": 200"#, r#""imageWidth": 160"#);
+    std::fs::write(folder.path().join("other.json"), smaller).unwrap();
+    let served = Served::of_project(folder);
+    let without = session(&served);
+    assert_eq!(names(&without["images"]), ["rod.png"]);
+    let note = without["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("other.png: ") && note.contains("annotation of another image"), "{note}");
+    // Without these marks it is a photo of the project again.
+    let folder = served.end();
+    std::fs::remove_file(folder.path().join("other.json")).unwrap();
+    assert_eq!(names(&session(&Served::of_project(folder))["images"]), ["rod.png", "other.png"]);
+}
+
+#[test]
+fn photos_of_another_size_than_the_calibrated_camera_s_are_refused_by_name() {
+    let folder = folder_of(&["rod.png"]);
+    let rod = folder.path().join("rod.png");
+    std::fs::write(rod.with_extension("json"), LABELME).unwrap();
+    let open = |images: Vec<_>, project| {
+        let options = SessionOptions { images, project, photo_size: Some([160, 100]), ..SessionOptions::default() };
+        Session::open(&options, Arc::new(InPlace))
+    };
+    let is_told = |told: &str| assert!(told.contains("rod.png: expected 160 × 100 pixels"), "{told}");
+    is_told(&open(vec![(rod, None)], None).err().expect("an error").to_string());
+    let session = open(Vec::new(), Some(folder.path().to_owned())).unwrap();
+    let view = session.view();
+    assert_eq!(view.images.len(), 0);
+    is_told(&view.notes[0]);
+    is_told(&session.upload_photo("rod.png", &photo_png()).unwrap_err().to_string());
+    let tried = session.add_trial_picture("rod.png", &photo_png()).unwrap();
+    is_told(&session.accept(tried.id, Marks::default()).unwrap_err().to_string());
+}
+
+#[test]
+fn a_picture_without_the_part_that_becomes_a_photo_again_is_no_negative() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    served.ask("DELETE", "/api/images/1", b"").json();
+    served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").json();
+    assert_eq!(names(&session(&served)["others"]), ["found.png"]);
+    served.ask("POST", "/api/others/0/photo", b"").json();
+    let tried = session(&served)["trial_pictures"][0].clone();
+    assert_eq!((&tried["became"], &tried["is_absent"]), (&json!(1), &json!(false)));
 }
 
 #[test]
@@ -268,6 +323,31 @@ fn a_model_is_not_old_because_its_marks_were_read_from_the_file() {
 }
 
 #[test]
+fn a_model_is_old_after_a_change_of_the_heights() {
+    let folder = folder_of(&["rod.png"]);
+    let open = |heights_m| {
+        let images = vec![(folder.path().join("rod.png"), None)];
+        let options = SessionOptions { images, heights_m, ..SessionOptions::default() };
+        Session::open(&options, Arc::new(InPlace)).unwrap()
+    };
+    let taught = open(Some([0.016, 0.009]));
+    taught.set_marks(0, serde_json::from_str(MARKS).unwrap()).unwrap();
+    taught.start_teaching(serde_json::from_str(r#"{"model": "S"}"#).unwrap()).unwrap();
+    while taught.teaching_news().status != Status::Done {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    drop(taught);
+    let is_stale = |heights_m| open(heights_m).view().models[0].is_stale;
+    assert_eq!([None, Some([0.016, 0.009]), Some([0.02, 0.009])].map(is_stale), [false, false, true]);
+    // Earlier programs did not record the heights.
+    let project = folder.path().join("rod.sdg-project.json");
+    let mut file: Value = serde_json::from_slice(&std::fs::read(&project).unwrap()).unwrap();
+    assert!(file["models"][0].as_object_mut().unwrap().remove("heights_m").is_some());
+    std::fs::write(&project, file.to_string()).unwrap();
+    assert!(!is_stale(Some([0.02, 0.009])));
+}
+
+#[test]
 fn what_is_not_there_for_a_while_stays_in_the_project() {
     let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
@@ -292,6 +372,22 @@ fn what_is_not_there_for_a_while_stays_in_the_project() {
     for what in ["images", "trial_pictures"] {
         assert_eq!(again[what], left[what], "{what}");
     }
+}
+
+#[test]
+fn a_tried_picture_stays_linked_to_its_photo_while_that_is_missing() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    let folder = served.end();
+    let [away, there] = ["away", "found.png"].map(|name| folder.path().join(name));
+    std::fs::rename(&there, &away).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    assert_eq!(session(&served)["trial_pictures"][0]["became"], Value::Null);
+    served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}").json();
+    let folder = served.end();
+    std::fs::rename(&away, &there).unwrap();
+    assert_eq!(session(&Served::of_photo(folder, "rod.png"))["trial_pictures"][0]["became"], 1);
 }
 
 #[test]

@@ -285,6 +285,37 @@ fn the_region_is_kept_whatever_the_model_says() {
 }
 
 #[test]
+fn a_version_that_is_used_again_searches_the_region_of_the_page() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    let region = json!({"x": 0, "y": 10, "width": 150, "height": 80, "picture": [200, 100]});
+    served.ask("PUT", "/api/region", region.to_string().as_bytes()).json();
+    assert_eq!(served.ask("PUT", "/api/models/0/current", b"").json()["region"], region);
+}
+
+#[test]
+fn a_model_has_the_name_of_its_part_after_a_change_of_the_name() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    let rename = |name: &str| served.ask("PUT", "/api/label", json!({"label": name}).to_string().as_bytes()).json();
+    rename("rod");
+    teach(&served);
+    rename("bar");
+    let is_there = |name: &str| served.folder.path().join(name).exists();
+    assert!(is_there("rod.sdg") && is_there("bar.sdg"));
+    // Renamed during a teaching.
+    let request = json!({"model": "S", "steps": 100}).to_string();
+    served.ask("POST", "/api/teaching", request.as_bytes()).json();
+    rename("lid");
+    std::fs::remove_file(served.folder.path().join("bar.sdg")).unwrap();
+    while served.ask("GET", "/api/teaching", b"").json()["status"] != "done" {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(is_there("lid.sdg") && !is_there("bar.sdg"));
+}
+
+#[test]
 fn a_model_file_that_is_gone_is_told_once_and_stays_named() {
     let served = project();
     served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
@@ -298,6 +329,11 @@ fn a_model_file_that_is_gone_is_told_once_and_stays_named() {
     let notes: Vec<&str> = view["notes"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     assert!(notes.len() == 1 && notes[0].matches("cannot read").count() == 1 && notes[0].contains(&name), "{notes:?}");
     assert_eq!(view["models"][0]["is_current"], false);
+    // A file of another content is there, but unsuitable.
+    let folder = served.end();
+    std::fs::write(&file, "no model").unwrap();
+    let served = Served::of_project(folder);
+    assert_eq!(get(&served)["notes"], json!(["The model of this project cannot be used here: no model"]));
     let folder = served.end();
     std::fs::rename(&away, &file).unwrap();
     assert_eq!(get(&Served::of_project(folder))["models"][0]["is_current"], true);

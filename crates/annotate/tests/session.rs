@@ -62,6 +62,19 @@ fn marks_are_written_as_they_are_made() {
 }
 
 #[test]
+fn marks_that_another_program_changed_are_sent_with_the_refusal() {
+    let served = Served::start();
+    let other = json!({"imageWidth": 200, "imageHeight": 100, "shapes": [
+        {"label": "bar", "shape_type": "rectangle", "points": [[10, 20], [110, 60]]}]});
+    std::fs::write(served.folder.path().join("photo.json"), other.to_string()).unwrap();
+    let refused = served.ask("PUT", "/api/images/0/marks", marks().to_string().as_bytes());
+    let told: Value = serde_json::from_slice(&refused.body).unwrap();
+    assert_eq!((refused.status, &told["image"]["marks"]["box"]), (409, &json!([10.0, 20.0, 110.0, 60.0])));
+    assert!(told["error"].as_str().unwrap().contains("another program changed these marks"), "{told}");
+    assert_eq!(put_marks(&served, &marks())["saved"]["file"], "photo.coco.json");
+}
+
+#[test]
 fn strokes_correct_an_outline_that_was_drawn() {
     let served = Served::start();
     // Half of the bar, and a triangle of the table above it, which no detection would find.

@@ -52,6 +52,9 @@ impl TeachingFiles<'_> {
         for (demonstration, (photo, _)) in demonstrations.iter().zip(self.demonstrations) {
             camera.check_picture(&demonstration.image).with_context(|| photo.display().to_string())?;
         }
+        for (negative, path) in options.negatives.iter().zip(self.negatives) {
+            camera.check_picture(negative).with_context(|| path.display().to_string())?;
+        }
         let (seen, lengths) = camera.seen_from_above(&demonstrations, mark_height_m, grasp_height_m)?;
         options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
         if let Some(region) = &options.region {

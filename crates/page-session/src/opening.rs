@@ -81,7 +81,8 @@ pub fn open_chosen(teacher: &PageTeacher, path: &Path) -> Result<Session> {
 
 fn open(teacher: &PageTeacher, options: SessionOptions, locks: Vec<WriterLock>) -> Result<Session> {
     let (max_opening_px, pixel_frame) = (teacher.max_opening_px(), teacher.pixel_frame());
-    let options = SessionOptions { max_opening_px, pixel_frame, ..options };
+    let (photo_size, heights_m) = (teacher.photo_size(), teacher.camera.as_ref().map(|(_, heights_m)| *heights_m));
+    let options = SessionOptions { max_opening_px, pixel_frame, photo_size, heights_m, ..options };
     Ok(Session::open(&options, Arc::new(teacher.clone()))?.holding(locks))
 }
 
@@ -111,6 +112,9 @@ mod tests {
     use sdg_annotate::Marks;
     use sdg_grasp::Preset;
     use sdg_inputs::camera_files::CameraFile;
+
+    const MARKED: &str = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [
+            {"label": "bar", "shape_type": "rectangle", "points": [[10, 10], [30, 20]]}]}"#;
 
     fn teacher() -> PageTeacher {
         PageTeacher { preset: Preset::default(), camera: None }
@@ -157,6 +161,22 @@ mod tests {
     }
 
     #[test]
+    fn a_part_is_renamed_in_all_files_or_in_none() {
+        let folder = folder_of(&["a.png", "b.png"]);
+        for name in ["a.json", "b.json"] {
+            std::fs::write(folder.path().join(name), MARKED).unwrap();
+        }
+        let session = open_with(folder.path(), &["a.png", "b.png"]).unwrap();
+        let other = open_chosen(&teacher(), &folder.path().join("b.png")).unwrap();
+        assert!(session.set_label("rod").unwrap_err().to_string().contains("locked by process"));
+        assert_eq!(session.view().label, "bar");
+        assert!(!folder.path().join("a.coco.json").exists());
+        drop(other);
+        assert_eq!(session.set_label("rod").unwrap().label, "rod");
+        assert!(folder.path().join("a.coco.json").exists());
+    }
+
+    #[test]
     fn a_photo_with_two_spellings_of_its_path_is_one_photo() {
         let folder = folder_of(&["a.png", "b.png"]);
         std::fs::create_dir(folder.path().join("sub")).unwrap();
@@ -169,10 +189,8 @@ mod tests {
     fn a_folder_of_many_marked_photos_needs_one_lock() {
         let names: Vec<String> = (0..20).map(|number| format!("{number}.png")).collect();
         let folder = folder_of(&names.iter().map(String::as_str).collect::<Vec<_>>());
-        let marks = r#"{"imageWidth": 60, "imageHeight": 40, "shapes": [
-            {"label": "bar", "shape_type": "rectangle", "points": [[10, 10], [30, 20]]}]}"#;
         for number in 0..20 {
-            std::fs::write(folder.path().join(format!("{number}.json")), marks).unwrap();
+            std::fs::write(folder.path().join(format!("{number}.json")), MARKED).unwrap();
         }
         let session = open_chosen(&teacher(), folder.path()).unwrap();
         assert_eq!(session.view().images.len(), 20);

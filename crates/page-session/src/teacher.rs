@@ -17,7 +17,8 @@ use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::{Share, TaughtFile, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
-    CheckConfig, GraspModel, Preset, TeachOptions, TeachingEvent, check_region_from_above, check_teaching_region,
+    CheckConfig, GraspError, GraspModel, Preset, TeachOptions, TeachingEvent, check_region_from_above,
+    check_teaching_region,
 };
 use sdg_inputs::camera_files::CameraFile;
 use sdg_inputs::one_line;
@@ -127,7 +128,8 @@ impl PageTeacher {
             options.over_table = Some(camera.over_table);
             demonstrations = Cow::Owned(seen);
         }
-        let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))?;
+        let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))
+            .map_err(|error| with_name(error, &material.negative_names))?;
         Ok((file, demonstrations))
     }
 
@@ -149,6 +151,11 @@ impl PageTeacher {
         let over_table = &file.over_table;
         let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
         Some(HAND_OPENING_MAX_M / scale)
+    }
+
+    /// Width and height of photos, with a calibrated camera.
+    pub fn photo_size(&self) -> Option<[u32; 2]> {
+        self.camera.as_ref().map(|(camera, _)| camera.size_px())
     }
 
     /// The orientation of the pixels of photos and of pictures to try: a calibration is for the sensor's pixels.
@@ -174,6 +181,16 @@ impl PageTeacher {
         let pictures = Arc::new(CameraPictures::read(camera, matches!(address, Address::Sim(_)), check));
         LiveOptions { pictures, address: address.to_string(), photo_path }
     }
+}
+
+/// The error of a teaching, with the name of the picture that it is about.
+fn with_name(error: GraspError, negative_names: &[String]) -> TeacherError {
+    if let GraspError::DemonstrationAsNegative { number } = &error
+        && let Some(name) = negative_names.get(number - 1)
+    {
+        return format!("{name}: expected a picture without the part, found a demonstration").into();
+    }
+    error.into()
 }
 
 /// `seconds` is the duration of teaching and, with `figures`, of the test on held-out samples.
@@ -229,9 +246,41 @@ mod tests {
     use sdg_annotate::{ModelKind, Session, SessionOptions};
     use std::path::Path;
 
+    const DATASETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets");
+
+    fn pendulum() -> Demonstration {
+        let folder = Path::new(DATASETS).join("demonstrations/pendulum");
+        let [photo, marks] = ["image.png", "annotation.json"].map(|name| folder.join(name));
+        sdg_inputs::demonstrations::read_pair(&photo, &marks).unwrap()
+    }
+
+    fn request() -> TeachRequest {
+        TeachRequest {
+            model: ModelKind::S,
+            time_budget_secs: None,
+            steps: None,
+            symmetry: 1,
+            fixed_height: false,
+            seed: 1,
+            region: None,
+        }
+    }
+
+    #[test]
+    fn a_demonstration_among_the_pictures_without_the_part_is_named() {
+        let material = TeachingMaterial {
+            negatives: vec![RgbImage::new(640, 480), pendulum().image],
+            negative_names: ["empty.png", "part.png"].map(str::to_owned).to_vec(),
+            demonstrations: vec![pendulum()],
+        };
+        let teacher = PageTeacher { preset: Preset::default(), camera: None };
+        let refused = teacher.teach_on_trial(&material, &request()).err().unwrap().to_string();
+        assert!(refused.starts_with("part.png: expected a picture without the part"), "{refused}");
+    }
+
     #[test]
     fn a_model_opens_with_a_smaller_camera_if_its_region_is_replaced() {
-        let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
+        let datasets = Path::new(DATASETS);
         let folder = tempfile::tempdir().unwrap();
         let text = std::fs::read_to_string(datasets.join("workcell/camera.yaml")).unwrap();
         let small = text
@@ -244,19 +293,9 @@ mod tests {
             let camera = Some((CameraFile::read(&path).unwrap(), [0.016, 0.009]));
             PageTeacher { preset: Preset::default(), camera }
         });
-        let pendulum = datasets.join("demonstrations/pendulum");
-        let [photo, marks] = ["image.png", "annotation.json"].map(|name| pendulum.join(name));
-        let demonstrations = vec![sdg_inputs::demonstrations::read_pair(&photo, &marks).unwrap()];
-        let material = TeachingMaterial { demonstrations, negatives: Vec::new() };
-        let request = TeachRequest {
-            model: ModelKind::S,
-            time_budget_secs: None,
-            steps: None,
-            symmetry: 1,
-            fixed_height: false,
-            seed: 1,
-            region: Some(Region { x: 0, y: 0, width: 640, height: 480, picture: Some([640, 480]) }),
-        };
+        let material = TeachingMaterial { demonstrations: vec![pendulum()], ..TeachingMaterial::default() };
+        let region = Region { x: 0, y: 0, width: 640, height: 480, picture: Some([640, 480]) };
+        let request = TeachRequest { region: Some(region), ..request() };
         let taught = large.teach_on_trial(&material, &request).unwrap();
         let bytes = taught.to_bytes().unwrap();
         assert!(small.open(&bytes, &taught.summary(), None).is_err(), "its region is beyond the smaller pictures");

@@ -85,6 +85,7 @@ pub(super) const PAGE: Target = Target {
             &[live, ("GET", "/api/live/3/picture", b"")],
             &[live, ("POST", "/api/live/3/photo", b"")],
             &[live, ("POST", "/api/live/3/keep", b"")],
+            &[live, ("POST", "/api/live/3/hold", b"")],
             &[live, ("POST", "/api/live/3/detect", b"")],
             &[marked, ("GET", "/api/images/0/samples/1?seed=7", b"")],
             &[marked, ("POST", "/api/teaching", teaching)],
@@ -248,6 +249,7 @@ fn serve_start() -> Serving {
         recent: Some(recent),
         folder: folder.path().to_owned(),
         pixel_frame: PixelFrame::Upright,
+        photo_size: None,
         open: Box::new(open),
     };
     serve(folder, Server::bind_start(start, 0, Some(TOKEN)).expect("a port of this computer"))

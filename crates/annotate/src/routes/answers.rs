@@ -3,7 +3,7 @@
 use sdg_files::FileError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::http::Response;
@@ -40,14 +40,21 @@ pub fn picture_of(outcome: Result<(Vec<u8>, &'static str)>) -> Response {
 }
 
 fn refusal(error: &Error) -> Response {
+    refusal_with(error, json!({}))
+}
+
+/// The response to an error, with further members of its JSON object.
+pub fn refusal_with(error: &Error, mut body: Value) -> Response {
     let status = match error {
         Error::NoSuchPicture { .. } | Error::NoSuchVersion { .. } | Error::NoSuchFrame { .. } | Error::NoCamera => 404,
         Error::Demonstration { .. }
         | Error::NotMarked { .. }
         | Error::SharedMarks { .. }
+        | Error::OtherSize { .. }
         | Error::Request { .. }
         | Error::Teacher(_) => 422,
         Error::Busy(_)
+        | Error::MarksChanged
         | Error::NotTaught
         | Error::TooManyPictures { .. }
         | Error::Camera { .. }
@@ -55,5 +62,6 @@ fn refusal(error: &Error) -> Response {
         Error::TooLarge { .. } => 413,
         _ => 500,
     };
-    Response::new(status, JSON, json!({"error": error.to_string()}).to_string().into_bytes())
+    body["error"] = error.to_string().into();
+    Response::new(status, JSON, body.to_string().into_bytes())
 }

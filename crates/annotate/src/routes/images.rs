@@ -3,8 +3,9 @@
 use sdg_demonstration::OutlineStroke;
 use sdg_geometry::{BoundingBox, Polygon};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-use super::answers::{json_of, picture_of, read};
+use super::answers::{json_of, picture_of, read, refusal_with};
 use crate::error::{Error, Result};
 use crate::http::{Request, Response};
 use crate::outline;
@@ -15,7 +16,14 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
     let body = &request.body;
     Some(match (method, rest) {
         ("GET", ["picture"]) => picture_of(session.picture(id).and_then(|picture| picture.for_browser())),
-        ("PUT", ["marks"]) => json_of(read("marks", body).and_then(|marks| session.set_marks(id, marks))),
+        ("PUT", ["marks"]) => match read("marks", body).and_then(|marks| session.set_marks(id, marks)) {
+            // The page adopts the marks of the file; otherwise its next change would replace them.
+            Err(error @ Error::MarksChanged) => match session.image_view(id) {
+                Ok(image) => refusal_with(&error, json!({ "image": image })),
+                Err(error) => json_of::<()>(Err(error)),
+            },
+            outcome => json_of(outcome),
+        },
         ("DELETE", []) => json_of(session.remove_image(id).map(|()| session.view())),
         ("POST", ["put-back"]) => json_of(session.put_back_image(id).map(|()| session.view())),
         ("POST", ["outline"]) => json_of(propose_outline(session, id, body)),

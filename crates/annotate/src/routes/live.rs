@@ -28,6 +28,7 @@ pub fn answer(session: &Session, method: &str, rest: &[&str]) -> Option<Response
                 .and_then(|desk| desk.frame(number))
                 .and_then(|picture| detect(session, &picture, Explained::InWords)),
         ),
+        ("POST", "hold") => json_of(session.live_desk().and_then(|desk| desk.hold(number))),
         ("POST", "photo") => json_of(session.take_photo(number)),
         ("POST", "keep") => json_of(session.keep_frame(number)),
         _ => return None,

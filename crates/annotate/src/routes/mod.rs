@@ -17,7 +17,7 @@
 //! | `PUT /api/label` | renames the object |
 //! | `PUT /api/region` | sets the searched region; null for the whole picture |
 //! | `GET /api/images/{id}/picture` | a marked picture |
-//! | `PUT /api/images/{id}/marks` | stores and writes marks; returns the result of checking them |
+//! | `PUT /api/images/{id}/marks` | stores and writes marks; returns the result of checking them; a refusal because another program changed them has the photo with its new marks as `image` |
 //! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | removes the picture from the session; its file is kept |
 //! | `POST /api/images/{id}/put-back`, `/api/trial-pictures/{id}/put-back` | restores a removed picture |
 //! | `POST /api/images/{id}/outline` | proposes an outline from a box, or corrects one, with strokes; null if nothing differs from its surroundings |
@@ -34,6 +34,7 @@
 //! | `GET /api/live` | the number of the camera's newest frame, and the camera's fault |
 //! | `GET /api/live/{number}/picture` | a frame that was shown, as JPEG |
 //! | `POST /api/live/{number}/detect` | grasps in the frame |
+//! | `POST /api/live/{number}/hold` | keeps the frame while later ones are shown, for a page that pauses |
 //! | `POST /api/live/{number}/photo` | writes the frame as a photo of the part |
 //! | `POST /api/live/{number}/keep` | makes the frame a picture to try |
 

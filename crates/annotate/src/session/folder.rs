@@ -113,6 +113,9 @@ impl Session {
                 state.images.len() - 1
             }
         };
+        // The picture, or the tried one from which it was made, may have been declared to be without the part.
+        let is_same = |trial: &TrialPicture| trial.became == Some(id) || trial.picture.is_at(&path);
+        state.trial_pictures.iter_mut().filter(|trial| is_same(trial)).for_each(|trial| trial.is_absent = false);
         state.save_project()?;
         Ok(state.image_view(id))
     }
@@ -144,11 +147,12 @@ impl Session {
     /// lies there already.
     ///
     /// # Errors
-    /// The bytes are not a picture, an Exif orientation rotates a photo of a calibrated camera, or the file cannot be
-    /// written.
+    /// The bytes are not a picture, an Exif orientation rotates a photo of a calibrated camera or it has another size,
+    /// or the file cannot be written.
     pub fn upload_photo(&self, name: &str, bytes: &[u8]) -> Result<ImageView> {
         let shown = name.rsplit(['/', '\\']).next().unwrap_or(name);
-        Picture::check_photo(bytes, shown, self.pixel_frame)?;
+        let size = self.state().photo_size;
+        Picture::check_photo(bytes, shown, self.pixel_frame, size)?;
         if let Some(id) = self.same_other(shown, bytes) {
             return self.add_photo(id);
         }

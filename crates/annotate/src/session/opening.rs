@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use sdg_files::absolute;
 
 use super::{Session, SessionOptions};
+use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::guard::new_token;
 use crate::live::LiveDesk;
@@ -24,10 +25,11 @@ impl Session {
     /// Opens pictures, their marks and their project.
     ///
     /// # Errors
-    /// Neither picture nor camera, a given picture that cannot be read, marks that belong to another picture or are in
-    /// the file of another photo, another file in the place of a project's, or a photo of a calibrated camera that an
-    /// Exif orientation rotates. Unreadable pictures of the project or of a folder, and photos of the project whose
-    /// marks are in the file of another one, are left out; the notes for the user name them.
+    /// Neither picture nor camera, a given picture that cannot be read, marks of a given picture that belong to another
+    /// picture or are in the file of another photo, a given photo of another size than those of the calibrated camera,
+    /// another file in the place of a project's, or a photo of a calibrated camera that an Exif orientation rotates.
+    /// Unreadable pictures of the project or of a folder, and photos of the project with these faults of marks and
+    /// size, are left out; the notes for the user name them.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
         let place = match (&options.project, options.images.first()) {
             (Some(folder), _) => Some(ProjectPlace::of_folder(folder)),
@@ -47,8 +49,8 @@ impl Session {
         let mut marks_files = project.marks.clone();
         // Without the recorded file, the marks are those beside the photo. A missing photo may come back with its file.
         marks_files.retain(|photo, file| {
-            let file = folder.join(file);
-            gone.photos.contains(photo) || [file.with_extension("coco.json"), file].iter().any(|file| file.exists())
+            let files = annotation_file::files_of(&folder.join(photo), &folder.join(file));
+            gone.photos.contains(photo) || files.iter().any(|file| file.exists())
         });
         for (path, marks) in &options.images {
             if let Some(marks) = marks {
@@ -75,15 +77,22 @@ impl Session {
                 gone.photos.push(name);
                 continue;
             };
-            let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
-            if let Err(error) = image.check_file(images.iter()) {
-                if is_given {
-                    return Err(error);
+            picture.check_is_markable()?;
+            let open = || {
+                picture.check_size(options.photo_size)?;
+                let (image, named) = MarkedPicture::of(picture, annotation.as_deref())?;
+                image.check_file(images.iter())?;
+                Ok::<_, Error>((image, named))
+            };
+            let (image, named) = match open() {
+                Ok(opened) => opened,
+                Err(error) if is_given => return Err(error),
+                Err(error) => {
+                    gone.leave_out_named(&name, &error);
+                    gone.photos.push(name);
+                    continue;
                 }
-                gone.leave_out(&error);
-                gone.photos.push(name);
-                continue;
-            }
+            };
             notes.extend(recorded.map(|file| format!("The marks of {name} are in {file}.")));
             label = label.take().or(named);
             images.push(image);
@@ -134,7 +143,11 @@ impl Session {
                 }
                 Err(error) => {
                     is_model_lost = true;
-                    notes.push(format!("There is no model in use, as long as its file is not there: {error}"));
+                    let text = match error {
+                        Error::Teacher(_) => "The model of this project cannot be used here",
+                        _ => "There is no model in use, as long as its file cannot be read",
+                    };
+                    notes.push(format!("{text}: {error}"));
                 }
             }
         }
@@ -152,6 +165,8 @@ impl Session {
             marks_files,
             offered: Vec::new(),
             max_opening_px: options.max_opening_px,
+            photo_size: options.photo_size,
+            heights_m: options.heights_m,
             region,
             is_model_lost,
         };
@@ -223,7 +238,9 @@ fn trial_pictures(
         let picture = Picture { name: tried.name.clone(), ..opened };
         let photo = tried.became.as_ref().map(|photo| folder.join(photo));
         let became = photo.and_then(|photo| images.iter().position(|image| image.picture.is_at(&photo)));
-        trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
+        let missing_photo = tried.became.clone().filter(|photo| gone.photos.contains(photo));
+        let is_absent = tried.absent;
+        trial_pictures.push(TrialPicture { became, missing_photo, is_absent, ..TrialPicture::new(picture, false) });
     }
     let pictures = images.iter().map(|image| &image.picture).chain(trial_pictures.iter().map(|trial| &trial.picture));
     let mut taken: BTreeSet<_> = pictures.map(|picture| relative(folder, &picture.path)).collect();

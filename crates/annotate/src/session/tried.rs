@@ -4,6 +4,7 @@ use sdg_demonstration::ModelKind;
 use sdg_files::absolute;
 use serde::Deserialize;
 
+use super::models::teaching_material;
 use super::{MAX_LABEL_CHARS, Session};
 use crate::error::{Error, Result};
 use crate::marks::Marks;
@@ -12,7 +13,7 @@ use crate::picture::{Picture, extension_of, png};
 use crate::project_file::MAX_TRIAL_PICTURES;
 use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
-use crate::teacher::{TaughtModel, TeachRequest, TeachingMaterial};
+use crate::teacher::{TaughtModel, TeachRequest};
 use crate::views::{ComparedPicture, ImageView, Saved, TrialPictureView, VersionFound};
 
 /// A query whether learning from a picture would help in other pictures.
@@ -91,7 +92,11 @@ impl Session {
         if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration: remove that first"));
         }
-        state.trial_pictures[trial_id].is_absent = is_absent;
+        let trial = &mut state.trial_pictures[trial_id];
+        trial.is_absent = is_absent;
+        if is_absent {
+            trial.missing_photo = None;
+        }
         state.save_project()?;
         Ok(state.trial_picture_view(trial_id))
     }
@@ -185,9 +190,8 @@ impl Session {
             (MarkedPicture::unsaved(picture, marks).demonstration(&state.label)?, negatives, pictures, state.region)
         };
         demonstrations.push(further);
-        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
         let request = TeachRequest { region, ..teaching };
-        let material = TeachingMaterial { demonstrations, negatives };
+        let material = teaching_material(demonstrations, &negatives)?;
         let model = self.teacher.teach_on_trial(&material, &request).map_err(Error::Teacher)?;
         let best_in = |(id, picture): (usize, Picture)| {
             let found = model.detect(&picture.pixels()?).map_err(Error::Teacher)?;
@@ -202,7 +206,8 @@ impl Session {
     ///
     /// # Errors
     /// Unknown picture, the picture is a demonstration already, its marks' file is that of another photo or locked by
-    /// another process, an Exif orientation rotates a picture of a calibrated camera, or a file cannot be written.
+    /// another process, an Exif orientation rotates a picture of a calibrated camera or it has another size, or a file
+    /// cannot be written.
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
@@ -213,6 +218,7 @@ impl Session {
         let is_copied = copy.is_some();
         let mut picture = copy.unwrap_or(trial.picture);
         picture.check_is_markable()?;
+        picture.check_size(state.photo_size)?;
         let is_elsewhere = || absolute(&picture.path).parent() != absolute(&self.home).parent();
         if !is_copied && (trial.uploaded || is_elsewhere()) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();

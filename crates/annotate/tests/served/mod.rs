@@ -269,6 +269,7 @@ impl Served {
             recent: Some(recent),
             folder: folder.path().to_owned(),
             pixel_frame: PixelFrame::Upright,
+            photo_size: None,
             open: Box::new(open),
         };
         Self::serve(folder, Server::bind_start(start, 0, None).unwrap())

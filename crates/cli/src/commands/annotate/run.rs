@@ -35,6 +35,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             recent: recent::projects(),
             folder: PathBuf::new(),
             pixel_frame: teacher.pixel_frame(),
+            photo_size: teacher.photo_size(),
             open: opener(teacher),
         };
         Server::bind_start(start, args.port, token.as_deref())?
