@@ -40,9 +40,10 @@ struct Asked {
 
 impl Asked {
     fn new(args: &EvaluateArgs) -> Result<Self> {
-        let (preset, settings) = settings(args)?;
+        let models = models(&args.models, &ModelKind::ALL)?;
+        let (preset, settings) = settings(args, &models)?;
         Ok(Self {
-            models: models(&args.models, &ModelKind::ALL)?,
+            models,
             objects: objects(&args.objects, ObjectSpec::paper_names())?,
             preset,
             settings,
