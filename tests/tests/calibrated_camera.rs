@@ -12,7 +12,7 @@ use sdg_grasp::{
 };
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
 use sdg_simulation::views::{
-    Axis, AxisView, OTHER_CAMERAS, OnTable, OtherView, axis_view, demonstration_view, other_view,
+    Axis, AxisView, OTHER_CAMERAS, OnTable, OtherView, PICTURES_PER_AXIS, axis_view, demonstration_view, other_view,
 };
 
 /// Seed of the pictures, which no other test or evaluation uses.
@@ -106,7 +106,7 @@ fn assert_found_in_metres(models: &[(ObjectSpec, GraspModel)]) {
     for (part, model) in models {
         for axis in [Axis::Tilt, Axis::Height] {
             for number in 0..NUM_PICTURES {
-                let shown = axis_view(part, axis, number, SEED).unwrap();
+                let shown = axis_view(part, axis, (number, PICTURES_PER_AXIS), SEED).unwrap();
                 let about = format!("{}, {axis}, {number}", part.name);
                 let found = detect(model, &shown.view.camera, &shown.view.image);
                 errors.push(assert_found(&shown, &shown.view.camera, &found, &about));
@@ -129,7 +129,7 @@ fn assert_other_sizes_are_refused(models: &[(ObjectSpec, GraspModel)]) {
         let kinds = part.look_alike_kinds().unwrap();
         let is_scaled = |number: &u64| matches!(kinds[*number as usize % kinds.len()], LookAlikeKind::Scaled { .. });
         for number in (0..12).filter(is_scaled) {
-            let shown = axis_view(part, Axis::LookAlikes, number, SEED).unwrap();
+            let shown = axis_view(part, Axis::LookAlikes, (number, PICTURES_PER_AXIS), SEED).unwrap();
             let kind = shown.look_alike.unwrap();
             assert_eq!(kind, kinds[number as usize % kinds.len()]);
             let found = detect(model, &shown.view.camera, &shown.view.image);

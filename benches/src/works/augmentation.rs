@@ -9,7 +9,7 @@ use crate::protocol::Work;
 use crate::works::demonstration::read_demonstration;
 use crate::works::facts::facts;
 
-/// Samples per run, as in `peers/augmentation.py`.
+/// Samples per run, as in `peers/augmentation.py`, if the threads divide their number.
 const SAMPLES: usize = 64;
 
 pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {
@@ -18,8 +18,9 @@ pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {
         facts([("width", f64::from(demonstration.image.width())), ("height", f64::from(demonstration.image.height()))]);
     let augmenter = Augmenter::new(&[demonstration], AugmentationConfig::paper(), 1)?;
     let mut first = 0;
+    let per_thread = (SAMPLES / threads).max(1);
+    let pieces = per_thread * threads;
     let run = move || {
-        let per_thread = SAMPLES / threads;
         std::thread::scope(|scope| {
             for thread in 0..threads {
                 let (augmenter, from) = (&augmenter, first + (thread * per_thread) as u64);
@@ -30,8 +31,8 @@ pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {
                 });
             }
         });
-        first += SAMPLES as u64;
+        first += pieces as u64;
         Ok(())
     };
-    Ok(Work { pieces: SAMPLES, ..Work::new(size, run) })
+    Ok(Work { pieces, ..Work::new(size, run) })
 }

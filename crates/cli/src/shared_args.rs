@@ -79,7 +79,8 @@ pub struct OwnPartArgs {
     /// Mass of the part; default: computed from its volume at 1.5 g/cm3
     #[arg(long, value_name = "G", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub mass_g: Option<f64>,
-    /// Coefficient of friction of the part's surface; default: 0.6
+    /// Coefficient of friction of the part with everything that it touches; default: 0.6, and 1.0 with the rubber of
+    /// the finger pads
     #[arg(long, value_name = "MU", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
     pub friction: Option<f64>,
 }

@@ -237,6 +237,8 @@ fn wrong_usage_is_exit_code_2() {
         vec!["evaluate", "--models", "C,c"],
         vec!["evaluate", "--objects", "teapot"],
         vec!["evaluate", "--preset", "huge"],
+        vec!["evaluate", "--preset", "r50-torchvision", "--models", "S,C"],
+        vec!["evaluate", "--axes", "grasps", "--models", "A"],
         vec!["evaluate", "--scenes", "0"],
         vec!["evaluate", "--axis-views", "3"],
         vec!["evaluate", "--axes", "tilt", "--axis-views", "0"],

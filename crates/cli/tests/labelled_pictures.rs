@@ -327,6 +327,13 @@ fn the_file_of_sdg_annotate_is_preferred_to_that_of_another_tool() {
     let told = evaluate(&pictures, &model, &folder.path().join("report"), &[]);
     assert_eq!(told["left_out"], json!([{"file": "a.json", "why": "a.coco.json is used for a.png"}]));
     assert_eq!(told["parts"], 0);
+    // A renamed picture; the file still names the picture as it was.
+    for ending in ["png", "json", "coco.json"] {
+        fs::rename(pictures.join(format!("a.{ending}")), pictures.join(format!("b.{ending}"))).unwrap();
+    }
+    let told = evaluate(&pictures, &model, &folder.path().join("report"), &[]);
+    assert_eq!(told["left_out"], json!([{"file": "b.json", "why": "b.coco.json is used for b.png"}]));
+    assert_eq!(told["parts"], 0);
 }
 
 #[test]

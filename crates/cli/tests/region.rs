@@ -166,6 +166,12 @@ fn an_evaluation_leaves_pictures_of_another_size_out() {
     let output = sdg(&["evaluate", "--pictures", &pictures, "--grasp-model", &model, "--report", &folder.path("out")]);
     let told = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).concat();
     assert!(output.status.success() && told.contains("small.png: expected a picture of 640 × 480 pixels"), "{told}");
+    std::fs::remove_file(format!("{pictures}/same.png")).unwrap();
+    std::fs::remove_file(format!("{pictures}/same.json")).unwrap();
+    let output = sdg(&["evaluate", "--pictures", &pictures, "--grasp-model", &model, "--report", &folder.path("out")]);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("expected a picture to search, found 1 files that are left out; small.png: "), "{told}");
 }
 
 #[test]

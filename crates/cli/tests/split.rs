@@ -181,6 +181,9 @@ fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
     let notes = folder.text("notes.txt", "notes");
     refused(&[&measure[..], &["--tuned", "--records", &notes]].concat(), 1, "or JSON to replace, found text");
     refused(&[&measure[..], &["--seeds", "1,1"]].concat(), 2, "found 1 again");
+    let one_file = folder.path("figures.json");
+    let both = ["--tuned", "--results", &one_file, "--records", &one_file];
+    refused(&[&measure[..], &both].concat(), 2, "expected another file than --results");
     refused(&measure[..3], 2, "--sets");
     refused(&[&measure[..], &["--pictures", &set]].concat(), 2, "--pictures");
     let text = fs::read_to_string(&split).unwrap();
@@ -189,4 +192,8 @@ fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
     fs::write(&split, text).unwrap();
     fs::write(Path::new(&set).join("truth.json"), "[{\"image\": \"demo.png\"}]").unwrap();
     refused(&[&measure[..], &["--tuned"]].concat(), 1, "truth.json, entry 1 (demo.png): missing field `present`");
+    // Labels in other files are also read before a model is taught.
+    fs::remove_file(Path::new(&set).join("truth.json")).unwrap();
+    fs::write(Path::new(&set).join("key.json"), "{\"shapes\": [").unwrap();
+    refused(&[&measure[..], &["--tuned"]].concat(), 1, "key.json");
 }

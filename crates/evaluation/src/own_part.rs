@@ -8,8 +8,6 @@ use thiserror::Error;
 
 /// Density of a part whose mass is not given, in kg/m³: between plastic and aluminium.
 const ASSUMED_DENSITY: f64 = 1500.0;
-/// Friction coefficient of a part for which none is given: that of most shipped parts.
-const ASSUMED_FRICTION: f64 = 0.6;
 /// Maximum resolution of the model's photo, in pixels per metre: approximately that of the wrist camera on the table. A
 /// finer photo is reduced to it.
 const MAX_PIXELS_PER_M: f64 = 1000.0;
@@ -34,7 +32,7 @@ pub struct OwnPartSizes {
     /// Length of the longer side of the part's box, in mm.
     pub length_mm: Option<f64>,
     pub mass_g: Option<f64>,
-    /// Coefficient of friction of the part's surface.
+    /// Coefficient of friction of the part's surface, also between the fingers.
     pub friction: Option<f64>,
 }
 
@@ -113,7 +111,7 @@ impl OwnPart {
             metres_per_pixel,
             height_m,
             mass_kg: 0.0,
-            friction: sizes.friction.unwrap_or(ASSUMED_FRICTION),
+            friction: sizes.friction,
             symmetry: model.facts().symmetry,
         };
         if extrusion.symmetry == RotationalSymmetry::Fold(1) {
@@ -138,7 +136,7 @@ impl OwnPart {
             1e3 * short * metres_per_pixel,
             1e3 * height_m,
             1e3 * extrusion.mass_kg,
-            extrusion.friction,
+            object.friction,
             1e3 * object.jaw_width_m,
             assumed.into_iter().flatten().map(in_words).collect::<Vec<_>>().join(", ")
         );

@@ -56,6 +56,8 @@ pub struct RehearsedPlace {
     pub place: Place,
     /// A single cell of the place to use; with `None`, all its cells are used one after another.
     pub cell: Option<u32>,
+    /// All places of the workcell: parts that lie in one of them are not grasped, as by `sdg grasp`.
+    pub places: Vec<Place>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
     /// Extent of the part to all sides of its grasp, m.
@@ -82,7 +84,14 @@ impl RehearsedPlace {
         let cell = cell.and_then(|cell| cell.parse().ok());
         let place = place.expect("a name that the workcell knows");
         let GraspConfig { obstacles, part_radius_m, grasp_force_n, load, .. } = workcell.grasp_config();
-        Ok(Self { place, cell, obstacles, part_radius_m, grasp_force_n, load })
+        Ok(Self { place, cell, places: workcell.places, obstacles, part_radius_m, grasp_force_n, load })
+    }
+
+    /// The scenes: without distractors, and with the part beside obstacles and places.
+    fn variation(&self) -> VariationConfig {
+        let places = self.places.iter().map(Place::covered_area);
+        let taken = footprints_on_table(&self.obstacles).into_iter().chain(places).collect();
+        VariationConfig { distractors: 0..=0, taken, ..VariationConfig::default() }
     }
 
     /// The sequence's settings: those of the workcell, with the look-out poses of rehearsals.
@@ -246,11 +255,7 @@ impl Rehearsal<'_> {
     /// The simulation fails, or the model's lengths or the place are invalid.
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
-        let mut variation = VariationConfig::default();
-        if let Some(place) = &self.place {
-            variation.distractors = 0..=0;
-            variation.taken = footprints_on_table(&place.obstacles);
-        }
+        let variation = self.place.as_ref().map(RehearsedPlace::variation).unwrap_or_default();
         let scene = SceneVariation::sample(Some(self.object), &variation, seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
@@ -270,6 +275,9 @@ impl Rehearsal<'_> {
             table_height_m: 0.0,
         };
         let mut finder = ModelFinder::new(model, camera, SimulatedPictures).with_verification(self.verification);
+        if let Some(place) = &self.place {
+            finder.places.clone_from(&place.places);
+        }
         let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut finder, &config, seed) {
@@ -465,6 +473,22 @@ mod tests {
     fn attempts_of_neighbouring_seeds_differ() {
         let seeds = |seed| (1..=50).map(move |number| attempt_seed(seed, number));
         assert!(seeds(1).all(|one| seeds(2).all(|other| one != other)));
+    }
+
+    #[test]
+    fn no_part_starts_in_a_place() {
+        let sections = "\n[[bin]]\nname = \"bin\"\nat_mm = [450, 0]\nsize_mm = [150, 150]\n\
+                        [[place]]\nname = \"shelf\"\nat_mm = [550, 120]\n";
+        let text = include_str!("../../../datasets/workcell/workcell.toml").to_owned() + sections;
+        let place = RehearsedPlace::named("bin", WorkcellFile::from_toml(&text).unwrap()).unwrap();
+        let object = ObjectSpec::by_name("rod_end").unwrap();
+        let is_placed = |variation: &VariationConfig, seed: u64| {
+            let scene = SceneVariation::sample(Some(&object), variation, seed);
+            let (grasp, _) = object.grasp_in_base(&scene.object.unwrap().base_from_object);
+            place.places.iter().any(|place| place.covers([grasp.x, grasp.y]))
+        };
+        assert!((0..50).any(|seed| is_placed(&VariationConfig::default(), seed)));
+        assert!((0..50).all(|seed| !is_placed(&place.variation(), seed)));
     }
 
     #[test]

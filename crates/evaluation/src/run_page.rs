@@ -5,7 +5,8 @@ use sdg_demonstration::Demonstration;
 use sdg_geometry::median;
 use sdg_grasp::{GraspModel, History};
 use sdg_report::{
-    Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, outcome_matrix,
+    Animation, AnimationOptions, AttemptSummary, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table,
+    outcome_matrix,
 };
 use sdg_robot::{GraspStep, PlaceKind, PlacingConfig};
 use sdg_simulation::RecordConfig;
@@ -112,10 +113,16 @@ fn with_key_figures(report: Report, page: &RunPage) -> Report {
     let what = if page.rehearsed.is_placing() { "grasped and put down" } else { "grasped and held" };
     let report =
         report.key_figure(KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), what).tone(tone));
-    match median(attempts.iter().filter_map(|a| a.detection_error.map(|e| e.distance_mm))) {
+    match median_error_at_closing(attempts) {
         Some(mm) => report.key_figure(KeyFigure::new(format!("{mm:.1}"), "mm", "median error at closing")),
         None => report,
     }
+}
+
+/// The median position error of the attempts whose fingers closed, in millimetres.
+fn median_error_at_closing(attempts: &[AttemptSummary]) -> Option<f64> {
+    let has_closed = |attempt: &&AttemptSummary| attempt.step.is_some_and(|step| step >= GraspStep::Close as usize);
+    median(attempts.iter().filter(has_closed).filter_map(|attempt| Some(attempt.detection_error?.distance_mm)))
 }
 
 fn with_film(report: Report, page: &RunPage) -> Result<Report> {
@@ -190,8 +197,8 @@ fn attempts(rehearsed: &Rehearsed) -> Section {
         .lead(format!("Random poses of the part, robot starts, {varied}. A part is {done} if it is {meaning}."))
         .matrix(outcome_matrix(&steps, done, attempts, RIGHT_MM, RIGHT_DEGREES))
         .table(attempts_table(&steps, done, attempts).caption(
-            "The part's position is in the robot's base frame. Errors are those of the second detection, from above \
-             the part.",
+            "The part's position is in the robot's base frame. Errors are those of the last detection before the hand \
+             went down, mostly from above the part.",
         ))
 }
 
@@ -231,13 +238,12 @@ fn this_run(page: &RunPage) -> Section {
 #[cfg(test)]
 mod tests {
     use image::RgbImage;
-    use sdg_report::AttemptSummary;
+    use sdg_report::DetectionError;
 
     use super::*;
 
-    #[test]
-    fn a_picture_has_the_number_of_its_attempt() {
-        let attempt = |number| AttemptSummary {
+    fn attempt(number: usize) -> AttemptSummary {
+        AttemptSummary {
             number,
             object_mm: [0.0; 2],
             object_angle_deg: 0.0,
@@ -247,7 +253,23 @@ mod tests {
             success: false,
             why: String::new(),
             duration_secs: 0.0,
+        }
+    }
+
+    #[test]
+    fn only_attempts_that_closed_have_an_error_at_closing() {
+        let with_error = |step: GraspStep, distance_mm: f64| AttemptSummary {
+            detection_error: Some(DetectionError { distance_mm, angle_deg: 0.0 }),
+            step: Some(step as usize),
+            ..attempt(1)
         };
+        let attempts = [(GraspStep::Hover, 90.0), (GraspStep::Close, 2.0), (GraspStep::Hold, 4.0)];
+        assert_eq!(median_error_at_closing(&attempts.map(|(step, mm)| with_error(step, mm))), Some(3.0));
+        assert_eq!(median_error_at_closing(&[with_error(GraspStep::Approach, 1.0), attempt(2)]), None);
+    }
+
+    #[test]
+    fn a_picture_has_the_number_of_its_attempt() {
         let mut rehearsed = Rehearsed {
             planned: 5,
             attempts: vec![attempt(1), attempt(2)],

@@ -7,6 +7,7 @@ use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
 use sdg_geometry::PlanarGrasp;
 use sdg_grasp::{
     GraspModel, HIT_DEGREES, HIT_PX, History, LossValues, Taught, TaughtDemonstration, ValidationRecord, Verification,
+    without_unmarked_parts,
 };
 use sdg_report::{
     Axis, Chart, Color, Figure, GallerySize, KeyFigure, Pen, Report, Section, Series, Tone, draw_box,
@@ -14,15 +15,13 @@ use sdg_report::{
 };
 
 use crate::footer::FOOTER;
-use crate::held_back::HeldBackFigures;
+use crate::held_back::{HeldBackFigures, HeldBackSamples};
 use crate::machine::machine;
 
 /// Number of augmented samples on the page.
 const SHEET: u64 = 24;
 /// Number of samples in which the detections of the finished model are shown.
 const TRIED: u64 = 6;
-/// Index of the first of these samples, far beyond the samples of any training.
-const FIRST_TRIED: u64 = 1 << 40;
 
 /// The page of `sdg teach`.
 pub struct TeachingPage<'a> {
@@ -106,11 +105,12 @@ impl TeachingPage<'_> {
     fn tried(&self) -> Result<Section> {
         // The part may be anywhere in a sample.
         let model = self.taught.model.clone().with_region(None)?;
-        // Samples have the photo's size or shape, so that the part's size is in the searched range.
-        let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
+        // Samples of the test, in which the part's size is in the searched range.
+        let (alone, _) = without_unmarked_parts(&model, self.demonstrations)?;
+        let samples = HeldBackSamples::new(&alone, &model.held_out_sizes(), self.seed)?;
         let mut figures = Vec::new();
-        for i in 0..TRIED {
-            let sample = augmenter.sample(FIRST_TRIED + i);
+        for number in 0..TRIED {
+            let sample = samples.sample(number);
             let detections = model.detect(&sample.image, Verification::ByShape)?;
             let best = detections.iter().map(|detection| detection.score).fold(0.0, f64::max);
             let there = if sample.objects.is_empty() { "without the part" } else { "with the part" };

@@ -6,11 +6,12 @@
 //! CONDITION is `default` or the name of one condition (`tilt`, `cover`, `dark` …). FOLDER then contains `demo.png` and
 //! `demo.json`, and pictures `NNN.png` with `NNN.json` beside them: for each instance a rectangle and the points
 //! `grasp_start` and `grasp_end` with a common `group_id`. Instances with a visible fraction below
-//! [`MIN_VISIBLE_SHARE`] have the flag `optional`; pictures without the part have an empty list of shapes.
+//! [`MIN_VISIBLE_SHARE`] have the flag `optional`, and so have instances with a mark outside the picture, which have the
+//! rectangle only; pictures without the part have an empty list of shapes.
 
 use std::path::{Path, PathBuf};
 
-use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, LabelledInstance};
 use sdg_part_generator::{Condition, Part, Sample, SceneConfig, Scenes};
 
 /// Visible fraction below which an instance is optional.
@@ -34,20 +35,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenes = Scenes::new(&[Part::generate(part_seed)], config, seed)?;
     let taught = &scenes.photo(0).demonstration;
     taught.image.save(folder.join("demo.png"))?;
-    write_labels(&folder, "demo", taught.image.dimensions(), std::slice::from_ref(&taught.annotation), &[false])?;
+    write_labels(
+        &folder,
+        "demo",
+        taught.image.dimensions(),
+        &[LabelledInstance::new(taught.annotation.clone(), false)],
+    )?;
     for index in 0..count {
         let sample = scenes.sample(index);
         let name = format!("{index:03}");
         sample.image.save(folder.join(format!("{name}.png")))?;
-        let (marks, optional): (Vec<Annotation>, Vec<bool>) = labels(&sample).into_iter().unzip();
-        write_labels(&folder, &name, sample.image.dimensions(), &marks, &optional)?;
+        write_labels(&folder, &name, sample.image.dimensions(), &labels(&sample))?;
     }
     println!("{count} pictures in {}", folder.display());
     Ok(())
 }
 
 /// The marks of every instance in the picture, and whether it is optional.
-fn labels(sample: &Sample) -> Vec<(Annotation, bool)> {
+fn labels(sample: &Sample) -> Vec<LabelledInstance> {
     let (width, height) = (f64::from(sample.image.width()), f64::from(sample.image.height()));
     let inside = |p: nalgebra::Point2<f64>| (0.0..=width).contains(&p.x) && (0.0..=height).contains(&p.y);
     sample
@@ -55,18 +60,17 @@ fn labels(sample: &Sample) -> Vec<(Annotation, bool)> {
         .iter()
         .filter_map(|instance| {
             let bbox = instance.bbox.clip(width, height);
-            // A mark outside the picture cannot be written; such an instance is left out.
-            (inside(instance.grasp.start) && inside(instance.grasp.end) && bbox.width() > 1.0 && bbox.height() > 1.0)
-                .then(|| {
-                    let marks = Annotation {
-                        label: "part".into(),
-                        bbox,
-                        grasp: Some(instance.grasp),
-                        jaw_width: Some(instance.jaw_width_px),
-                        outline: None,
-                    };
-                    (marks, instance.visible_share < MIN_VISIBLE_SHARE)
-                })
+            // A mark outside the picture cannot be written.
+            let has_marks = inside(instance.grasp.start) && inside(instance.grasp.end);
+            let marks = Annotation {
+                label: "part".into(),
+                bbox,
+                grasp: has_marks.then_some(instance.grasp),
+                jaw_width: has_marks.then_some(instance.jaw_width_px),
+                outline: None,
+            };
+            let optional = !has_marks || instance.visible_share < MIN_VISIBLE_SHARE;
+            (bbox.width() > 1.0 && bbox.height() > 1.0).then(|| LabelledInstance::new(marks, optional))
         })
         .collect()
 }
@@ -75,19 +79,10 @@ fn write_labels(
     folder: &Path,
     name: &str,
     (width, height): (u32, u32),
-    marks: &[Annotation],
-    optional: &[bool],
+    instances: &[LabelledInstance],
 ) -> Result<(), Box<dyn std::error::Error>> {
     let file_name = format!("{name}.png");
     let facts = ImageFacts { width, height, file_name: Some(&file_name) };
-    let text = AnnotationFormat::LabelMe.write(&facts, marks)?.text;
-    let mut file: serde_json::Value = serde_json::from_str(&text)?;
-    for shape in file["shapes"].as_array_mut().into_iter().flatten() {
-        let group = shape["group_id"].as_u64().unwrap_or(0) as usize;
-        if group > 0 && optional[group - 1] {
-            shape["flags"] = serde_json::json!({"optional": true});
-        }
-    }
-    std::fs::write(folder.join(format!("{name}.json")), format!("{file:#}\n"))?;
-    Ok(())
+    let text = AnnotationFormat::LabelMe.write_labelled(&facts, instances)?.text;
+    Ok(std::fs::write(folder.join(format!("{name}.json")), text)?)
 }

@@ -4,6 +4,9 @@ use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3}
 
 use crate::error::{Result, RobotError};
 
+/// Radius of the area around the point of a pose, m.
+const POSE_RADIUS_M: f64 = 0.03;
+
 /// A place of a workcell, for one part or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
@@ -133,10 +136,18 @@ impl Place {
         [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(|p| self.at(p)).to_vec()
     }
 
+    /// A convex area of the table, counter-clockwise, base frame, m, that contains every point that [`Self::covers`].
+    pub fn covered_area(&self) -> Vec<Point2<f64>> {
+        match self.kind {
+            PlaceKind::Pose => [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|corner| self.at(corner.map(|side| side * POSE_RADIUS_M)))
+                .to_vec(),
+            PlaceKind::Tray { .. } | PlaceKind::Bin { .. } => self.corners(),
+        }
+    }
+
     /// Whether a part at x and y of the base frame (m) belongs to this place.
     pub fn covers(&self, at_m: [f64; 2]) -> bool {
-        /// Radius around the point of a pose.
-        const POSE_RADIUS_M: f64 = 0.03;
         let apart = Point2::from(at_m) - Point2::from(self.at_m);
         let (sin, cos) = self.yaw_rad.sin_cos();
         let [along, across] = [apart.x * cos + apart.y * sin, apart.y * cos - apart.x * sin];

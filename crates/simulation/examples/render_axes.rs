@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             for column in 0..COLUMNS {
                 // Both odd and even numbers are shown.
                 let number = (column * (PICTURES_PER_AXIS - 1) / (COLUMNS - 1)).min(PICTURES_PER_AXIS - 1);
-                let shown = axis_view(&spec, axis, number, seed)?;
+                let shown = axis_view(&spec, axis, (number, PICTURES_PER_AXIS), seed)?;
                 let shares: Vec<String> =
                     shown.truths.iter().map(|truth| format!("{:.2}", truth.visible_share)).collect();
                 println!("{part} {axis} {number}: {}; visible {}", shown.parameter.description, shares.join(" "));

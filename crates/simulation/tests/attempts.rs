@@ -130,6 +130,11 @@ fn every_part_of_known_pose_is_lifted() {
 
 /// A part of 1500 kg/m³ extruded from an outline in millimetres, marked lengthwise (along x) in its middle.
 fn extruded(outline_mm: &[[f64; 2]], height_mm: f64) -> ObjectSpec {
+    extruded_with(outline_mm, height_mm, |_| ())
+}
+
+/// That part with a change.
+fn extruded_with(outline_mm: &[[f64; 2]], height_mm: f64, change: impl FnOnce(&mut Extrusion<'_>)) -> ObjectSpec {
     let photo = RgbImage::from_pixel(80, 80, Rgb([180, 40, 40]));
     let outline = Polygon { vertices: outline_mm.iter().map(|&corner| Point2::from(corner)).collect() };
     let (bounds, half) = (outline.bounds(), Vector2::new(10.0, 0.0));
@@ -142,10 +147,11 @@ fn extruded(outline_mm: &[[f64; 2]], height_mm: f64) -> ObjectSpec {
         metres_per_pixel: 1e-3,
         height_m: 1e-3 * height_mm,
         mass_kg: 0.0,
-        friction: 0.6,
+        friction: None,
         symmetry: RotationalSymmetry::None,
     };
     extrusion.mass_kg = 1500.0 * extrusion.volume_m3();
+    change(&mut extrusion);
     ObjectSpec::extruded(&extrusion).unwrap()
 }
 
@@ -170,6 +176,20 @@ fn small_tall_and_forked_own_parts_are_lifted() {
         let mut cell = unlit_cell(SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6)))));
         let report = cell.run_oracle_attempt(&AttemptConfig::default(), 1).unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held, "{name}");
+    }
+}
+
+#[test]
+fn a_given_friction_holds_between_the_fingers() {
+    // 40 N of each finger hold 0.8 N at a friction of 0.01; the part weighs 2.9 N.
+    for (friction, is_held) in [(None, true), (Some(1.0), true), (Some(0.01), false)] {
+        let spec = extruded_with(&rectangle_mm(70.0, 20.0), 20.0, |extrusion| {
+            extrusion.mass_kg = 0.3;
+            extrusion.friction = friction;
+        });
+        let mut cell = unlit_cell(SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6)))));
+        let report = cell.run_oracle_attempt(&AttemptConfig::default(), 1).unwrap();
+        assert_eq!(report.outcome.is_held(), is_held, "{friction:?}: {:?}", report.outcome);
     }
 }
 

@@ -47,8 +47,10 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
         progress.finish();
         return told(args, outcomes);
     }
-    let (findings, photos) = teaching.check(&asked, outcomes, demonstrations.left_out, &progress)?;
+    let is_interrupted = || interrupt.is_requested();
+    let checked = teaching.check(&asked, outcomes, demonstrations.left_out, &is_interrupted, &progress);
     progress.finish();
+    let (findings, photos) = checked?;
     let report = page(&findings, &photos, &command(args, folder)).write(args.report.as_ref().unwrap_or(&args.out))?;
     if args.json {
         let mut line = findings.to_json();

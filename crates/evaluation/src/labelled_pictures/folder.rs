@@ -11,14 +11,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use nalgebra::Point2;
 use sdg_cell::Perception;
-use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
+use sdg_demonstration::{
+    AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance, PixelFrame,
+};
 use sdg_grasp::GraspModel;
 use sdg_inputs::marks_check::MarkedPhoto;
 use sdg_inputs::why_unreadable;
 
 use super::picture::{Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
-use super::truth_file::{TRUTH_FILE, read_truth};
+use super::truth_file::{TRUTH_FILE, TruthEntry, read_truth};
 use crate::error::EvaluationError;
 
 /// Maximum distance between the middle of an instance's grasp line and the grasp point of a demonstration, in lengths
@@ -38,6 +40,17 @@ pub struct LabelledFolder {
 }
 
 impl LabelledFolder {
+    /// Checks every label of a folder against its picture, before a model is taught.
+    ///
+    /// # Errors
+    /// As for [`Self::read`], except for errors that depend on a model.
+    pub fn check_labels(folder: &Path) -> Result<()> {
+        if folder.join(TRUTH_FILE).exists() {
+            return TruthEntry::read_all(folder).map(drop);
+        }
+        read_labels(folder, None, &mut Vec::new()).map(drop)
+    }
+
     /// Reads every label and checks it against its picture, before the detection, which takes long.
     ///
     /// With `label`, only instances with this label count. Otherwise, if there are several labels, only the model's
@@ -47,15 +60,16 @@ impl LabelledFolder {
     /// # Errors
     /// The folder has no pictures or labels; a label file is damaged or names a missing picture; marks are outside the
     /// picture or for another picture size; two files label the same picture; an instance that is not optional has no
-    /// grasp; no instance has the given label, which is not the model's object either; without a given label, there are several labels, and none is the model's
-    /// object; the model was taught from all pictures.
+    /// grasp; with a calibrated camera, a picture is stored rotated; no instance has the given label, which is not the
+    /// model's object either; without a given label, there are several labels, and none is the model's object; the model
+    /// was taught from all pictures.
     pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let (mut others, mut foreign_label) = (0, None);
         let read = if folder.join(TRUTH_FILE).exists() {
             read_truth(folder, detector, &mut left_out)?
         } else {
-            let read = read_labels(folder, detector, &mut left_out)?;
+            let read = read_labels(folder, Some(detector), &mut left_out)?;
             let label = chosen_label(folder, &read, detector.model(), label)?;
             let all = || read.iter().flat_map(|picture| &picture.instances);
             others = all().filter(|instance| !is_counted(instance, label.as_deref())).count();
@@ -71,6 +85,9 @@ impl LabelledFolder {
             if !taught.is_empty() && picture.instances.iter().all(|instance| instance.optional) {
                 left_out.push(LeftOut { file: picture.name(), why: "the model was taught from it".to_owned() });
             } else {
+                if detector.pixel_frame() == PixelFrame::Sensor {
+                    sdg_inputs::check_is_not_turned(&picture.path)?;
+                }
                 pictures.push(picture);
             }
         }
@@ -86,7 +103,8 @@ impl LabelledFolder {
     }
 }
 
-fn read_labels(folder: &Path, detector: &Perception, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
+/// Reads all labels. Without a detector, the pictures are not compared with a model's demonstrations.
+fn read_labels(folder: &Path, detector: Option<&Perception>, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
     let assigned = assign(folder, left_out)?;
     let read = assigned.pictures.iter().map(|(picture, labels)| {
         let (path, file) = &assigned.label_files[*labels];
@@ -115,8 +133,10 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
     left_out.extend(paths.iter().filter_map(unreadable));
     let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
     for path in paths.iter().filter(|path| sdg_files::has_extension(path, &["json"])) {
-        let same_name: Vec<&PathBuf> =
-            pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
+        let has_its_name = |picture: &&PathBuf| {
+            picture.file_stem() == path.file_stem() || picture.with_extension("coco.json") == *path
+        };
+        let same_name: Vec<&PathBuf> = pictures.iter().copied().filter(has_its_name).collect();
         let bytes = sdg_files::read(path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
         let file = match LabelFile::parse(&bytes) {
             // Other programs store JSON beside pictures as well.
@@ -199,7 +219,7 @@ struct ReadPicture {
     taught: Vec<Point2<f64>>,
 }
 
-fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Perception) -> Result<ReadPicture> {
+fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: Option<&Perception>) -> Result<ReadPicture> {
     let image = sdg_inputs::read_image(path)?;
     let (width, height) = image.dimensions();
     let name = file_name(path);
@@ -207,13 +227,11 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Percept
     let read =
         |facts: &ImageFacts| file.instances(facts).with_context(|| format!("{}, labels of {name}", labels.display()));
     let instances = marked.upright(read, |instance: &LabelledInstance| &instance.annotation)?;
-    Ok(ReadPicture {
-        path: path.to_owned(),
-        labels: labels.to_owned(),
-        size: [width, height],
-        instances,
-        taught: detector.taught_grasps(&image, taught_grasps).with_context(|| path.display().to_string())?,
-    })
+    let taught = match detector {
+        Some(detector) => detector.taught_grasps(&image, taught_grasps).with_context(|| path.display().to_string())?,
+        None => Vec::new(),
+    };
+    Ok(ReadPicture { path: path.to_owned(), labels: labels.to_owned(), size: [width, height], instances, taught })
 }
 
 impl ReadPicture {
@@ -236,13 +254,24 @@ impl ReadPicture {
     }
 }
 
-/// Makes an instance optional if the model was taught from it, because finding it again tests nothing.
+/// Makes an instance optional if the model was taught from it, because finding it again tests nothing. If no label marks
+/// the taught grasp, it is the instance around it, whose label marks another grasp.
 fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
-    for instance in instances {
-        instance.optional |= instance.grasp.is_some_and(|grasp| {
-            let reach = MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length();
-            taught.iter().any(|taught| (taught - grasp.center()).norm() <= reach)
-        });
+    for taught in taught {
+        let is_taught = |instance: &Instance| {
+            instance
+                .grasp
+                .is_some_and(|grasp| (taught - grasp.center()).norm() <= MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length())
+        };
+        if instances.iter().any(is_taught) {
+            instances.iter_mut().for_each(|instance| instance.optional |= is_taught(instance));
+            continue;
+        }
+        let distance = |instance: &&mut Instance| (taught - instance.bbox.center()).norm();
+        let around = instances.iter_mut().filter(|instance| instance.bbox.contains(taught));
+        if let Some(instance) = around.min_by(|one, other| distance(one).total_cmp(&distance(other))) {
+            instance.optional = true;
+        }
     }
 }
 
@@ -274,5 +303,33 @@ fn chosen_label(
             found: listed(),
         }
         .into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_geometry::{BoundingBox, GraspLine};
+
+    use super::*;
+
+    #[test]
+    fn the_taught_instance_is_optional_even_if_its_label_marks_another_grasp() {
+        let instance = |x1: f64, grasp_x: f64| Instance {
+            bbox: BoundingBox { x1, y1: 0.0, x2: x1 + 100.0, y2: 40.0 },
+            grasp: Some(GraspLine::new(Point2::new(grasp_x - 20.0, 20.0), Point2::new(grasp_x + 20.0, 20.0))),
+            optional: false,
+            extent: None,
+        };
+        let optional = |taught_x: f64| {
+            // The second one lies partly over the first one.
+            let mut instances = [instance(0.0, 30.0), instance(60.0, 110.0)];
+            mark_taught(&mut instances, &[Point2::new(taught_x, 20.0)]);
+            instances.map(|instance| instance.optional)
+        };
+        assert_eq!(optional(33.0), [true, false]);
+        assert_eq!(optional(108.0), [false, true]);
+        // Another grasp of the first one; the boxes of both contain it.
+        assert_eq!(optional(70.0), [true, false]);
+        assert_eq!(optional(200.0), [false, false]);
     }
 }

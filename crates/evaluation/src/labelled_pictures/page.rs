@@ -127,7 +127,10 @@ fn at_a_glance(totals: &Totals, offset: Option<&LabelOffset>) -> Section {
         }
     }
     let mut section = Section::new("At a glance")
-        .lead("A picture is clean if it has a correct detection and no wrong one.")
+        .lead(
+            "A picture is clean if it has a correct detection and no wrong one; a picture with optional instances only \
+             needs no detection.",
+        )
         .shares(chart);
     if let Some(offset) = offset {
         let words = offset.in_words();

@@ -7,7 +7,6 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use nalgebra::Point2;
 use sdg_cell::Perception;
-use sdg_demonstration::PixelFrame;
 use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry, percentile};
 use sdg_grasp::{GraspDetection, TaughtDemonstration, Verification};
 use serde::Serialize;
@@ -102,11 +101,8 @@ impl Tested {
     /// Reads a picture and runs the model on it.
     ///
     /// # Errors
-    /// The picture cannot be read or is stored rotated, or detection fails.
+    /// The picture cannot be read, or detection fails.
     pub fn detect(mut picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
-        if detector.pixel_frame() == PixelFrame::Sensor {
-            sdg_inputs::check_is_not_turned(&picture.path)?;
-        }
         let image = sdg_inputs::read_image(&picture.path)?;
         let start = Instant::now();
         let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
@@ -212,9 +208,10 @@ impl Judged {
         if self.has_part() { self.hits.iter().filter(|hit| hit.is_none()).count() } else { 0 }
     }
 
-    /// Whether a picture with the part has a hit and no wrong detection.
+    /// Whether a picture with the part has no wrong detection, and a hit unless all instances are optional.
     pub fn is_clean(&self) -> bool {
-        self.found.contains(&true) && self.wrong() == 0
+        let has_enough = self.found.contains(&true) || self.parts().of == 0;
+        self.has_part() && has_enough && self.wrong() == 0
     }
 
     /// Whether a picture without the part has a detection.
@@ -283,7 +280,7 @@ pub struct Totals {
     /// Number of detections without a hit in pictures with the part.
     pub wrong: usize,
     pub optional: Share,
-    /// Pictures with the part that have a hit and no wrong detection.
+    /// Pictures with the part that are [clean](Judged::is_clean).
     pub clean: Share,
     /// Pictures without the part that have a detection.
     pub false_alarms: Share,
@@ -469,6 +466,14 @@ mod tests {
         // not counted.
         assert!(hit.is_clean() && hit.errors().next().is_none());
         assert_eq!(hit.outcome(), Outcome::Missed);
+        // Nothing has to be found in a picture of optional instances.
+        for (detections, is_clean) in
+            [(Vec::new(), true), (vec![detection(200.0, 0.0, 0.9)], true), (vec![detection(300.0, 0.0, 0.9)], false)]
+        {
+            let judged = judged(vec![truth(200.0, 0.0, true)], detections);
+            assert_eq!((judged.is_clean(), judged.outcome() == Outcome::Right), (is_clean, is_clean));
+        }
+        assert!(!judged(Vec::new(), Vec::new()).is_clean());
     }
 
     #[test]

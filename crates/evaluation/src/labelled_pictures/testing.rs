@@ -1,6 +1,6 @@
 //! Runs a model on all pictures of a folder.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use sdg_cell::{CellError, Perception};
 use sdg_grasp::{GraspError, Verification};
 
@@ -20,26 +20,36 @@ pub struct TestedFolder {
     pub others: usize,
     /// See [`LabelledFolder::foreign_label`].
     pub foreign_label: Option<String>,
+    /// Whether the test was interrupted; the remaining pictures are then left out.
+    pub is_interrupted: bool,
 }
 
 impl LabelledFolder {
-    /// Searches the pictures in order. If the model has a region, pictures of another size than the one for which the
-    /// region is given are left out. `min_score` is used only in the reports of progress.
+    /// Searches the pictures in order, until `is_interrupted` returns true. If the model has a region, pictures of
+    /// another size than the one for which the region is given are left out. `min_score` is used only in the reports of
+    /// progress.
     ///
     /// # Errors
-    /// A picture cannot be read, or detection fails.
+    /// A picture cannot be read, or detection fails; or no picture was searched.
     pub fn test(
         self,
         detector: &Perception,
         verification: Verification,
         min_score: f64,
+        is_interrupted: &dyn Fn() -> bool,
         progress: &dyn Progress,
     ) -> Result<TestedFolder> {
         let Self { pictures, mut left_out, others, foreign_label } = self;
         progress.expect(pictures.len());
         let mut tested = Vec::with_capacity(pictures.len());
+        let mut was_interrupted = false;
         for picture in pictures {
             let name = picture.name();
+            was_interrupted |= is_interrupted();
+            if was_interrupted {
+                left_out.push(LeftOut { file: name, why: "the test was interrupted".to_owned() });
+                continue;
+            }
             let of_picture = match Tested::detect(picture, detector, verification) {
                 Ok(of_picture) => of_picture,
                 // The model's region is for pictures of a different size.
@@ -53,6 +63,9 @@ impl LabelledFolder {
             progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
             tested.push(of_picture);
         }
-        Ok(TestedFolder { tested, left_out, others, foreign_label })
+        if let (true, Some(LeftOut { file, why })) = (tested.is_empty(), left_out.last()) {
+            bail!("expected a picture to search, found {} files that are left out; {file}: {why}", left_out.len());
+        }
+        Ok(TestedFolder { tested, left_out, others, foreign_label, is_interrupted: was_interrupted })
     }
 }

@@ -1,6 +1,6 @@
 //! Runs each model on every part's photo: it must find the part in its own photo, and nothing in the other photos.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use rayon::prelude::*;
 use sdg_grasp::{Device, Verification};
@@ -33,20 +33,22 @@ impl CrossCheck {
     /// each of them in order; after every model, `done` gets its name and the number of these photos.
     ///
     /// # Errors
-    /// Photos or models cannot be read, or detection fails.
+    /// Photos or models cannot be read, or detection fails; or `is_interrupted` returned true.
     pub fn run(
         store: &PartStore,
         parts: &[&PartDemonstrations],
+        is_interrupted: &(dyn Fn() -> bool + Sync),
         seen: &mut dyn FnMut(&RgbImage),
         done: &(dyn Fn(&str, usize) + Sync),
     ) -> Result<Self> {
-        Self::run_in_rounds(store, parts, PHOTOS_AT_ONCE, seen, done)
+        Self::run_in_rounds(store, parts, PHOTOS_AT_ONCE, is_interrupted, seen, done)
     }
 
     fn run_in_rounds(
         store: &PartStore,
         parts: &[&PartDemonstrations],
         photos_at_once: usize,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
         seen: &mut dyn FnMut(&RgbImage),
         done: &(dyn Fn(&str, usize) + Sync),
     ) -> Result<Self> {
@@ -57,6 +59,9 @@ impl CrossCheck {
                 seen(photo);
             }
             let row = |part: &&PartDemonstrations| -> Result<Vec<f64>> {
+                if is_interrupted() {
+                    bail!("interrupted: run the same command again to compare the parts");
+                }
                 let model = sdg_inputs::read_model(&store.model_file(&part.name), &Device::flex())?;
                 let best = |photo: &RgbImage| -> Result<f64> {
                     let found = model.detect(photo, Verification::ByShape).with_context(|| part.name.clone())?;
@@ -128,11 +133,13 @@ mod tests {
             let mut num_seen = 0;
             let mut seen = |photo: &RgbImage| num_seen += usize::from(photo.dimensions() == (640, 480));
             let done = |_: &str, photos: usize| assert_eq!(photos, photos_at_once);
-            let check = CrossCheck::run_in_rounds(&store, &parts, photos_at_once, &mut seen, &done).unwrap();
+            let check = CrossCheck::run_in_rounds(&store, &parts, photos_at_once, &|| false, &mut seen, &done).unwrap();
             assert_eq!(num_seen, 2);
             check
         });
         assert_eq!(one_by_one.scores, at_once.scores);
+        let interrupted = CrossCheck::run(&store, &parts, &|| true, &mut |_| (), &|_, _| ()).unwrap_err();
+        assert!(interrupted.to_string().starts_with("interrupted"), "{interrupted}");
         assert!(at_once.finds_own(0) && at_once.finds_own(1) && at_once.look_alikes().is_empty(), "{at_once:?}");
     }
 

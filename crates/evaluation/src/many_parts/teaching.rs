@@ -83,12 +83,13 @@ impl PartTeaching<'_> {
     /// reduced for the page.
     ///
     /// # Errors
-    /// Photos or models cannot be read, or detection fails.
+    /// Photos or models cannot be read, or detection fails; or `is_interrupted` returned true.
     pub fn check(
         &self,
         parts: &[&PartDemonstrations],
         outcomes: PartOutcomes,
         left_out: Vec<(String, String)>,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
         progress: &dyn Progress,
     ) -> Result<(Findings, Vec<RgbImage>)> {
         let is_taught = |name: &str| {
@@ -100,7 +101,7 @@ impl PartTeaching<'_> {
         let mut thumbnails = Vec::with_capacity(taught.len());
         let mut seen = |photo: &RgbImage| thumbnails.push(thumbnail(photo));
         let done = |name: &str, photos: usize| progress.unit_done(&format!("{name}: run on {photos} photos"));
-        let check = CrossCheck::run(self.store, &taught, &mut seen, &done)?;
+        let check = CrossCheck::run(self.store, &taught, is_interrupted, &mut seen, &done)?;
         Ok((Findings::new(outcomes, check, left_out), thumbnails))
     }
 }

@@ -47,13 +47,17 @@ impl Counts {
         if told.is_empty() { "–".to_owned() } else { told.join("; ") }
     }
 
-    /// The lower `found`, the higher `wrong` and the higher `false_alarms`, each on its own.
+    /// The lower fraction `found`, the higher `wrong` and the higher `false_alarms`, each on its own.
     pub fn worse_of(self, other: Self) -> Self {
-        let count = |share: &Share| share.count;
+        // Without a division, because a total may be zero.
+        let by_fraction = |one: &Share, other: &Share| {
+            let fractions = (one.count * other.of).cmp(&(other.count * one.of));
+            fractions.then(one.count.cmp(&other.count))
+        };
         Self {
-            found: std::cmp::min_by_key(self.found, other.found, count),
-            wrong: std::cmp::max_by_key(self.wrong, other.wrong, count),
-            false_alarms: std::cmp::max_by_key(self.false_alarms, other.false_alarms, count),
+            found: std::cmp::min_by(self.found, other.found, by_fraction),
+            wrong: std::cmp::max_by(self.wrong, other.wrong, by_fraction),
+            false_alarms: std::cmp::max_by(self.false_alarms, other.false_alarms, by_fraction),
         }
     }
 }
@@ -71,5 +75,10 @@ mod tests {
         };
         let worst = counts(8, 2, 0).worse_of(counts(7, 1, 3));
         assert_eq!((worst.found.count, worst.wrong, worst.false_alarms.count), (7, Share { count: 2, of: 10 }, 3));
+        // 2 of 10 is worse than 3 of 100, and anything is worse than nothing.
+        let [few, many] =
+            [(2, 10), (3, 100)].map(|(count, of)| Counts { wrong: Share { count, of }, ..counts(8, 0, 0) });
+        assert_eq!([few.worse_of(many).wrong, many.worse_of(few).wrong], [few.wrong; 2]);
+        assert_eq!(Counts::default().worse_of(many).wrong, many.wrong);
     }
 }

@@ -12,10 +12,10 @@ use sdg_inputs::demonstrations;
 
 use super::counts::Counts;
 use super::file::SplitSet;
-use crate::labelled_pictures::{LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
+use crate::labelled_pictures::{LabelledFolder, Tested};
 use crate::taught_file::TaughtFile;
 
-/// A set whose demonstration was read, and whose `truth.json`, if there is one, was checked.
+/// A set whose demonstration was read, and whose labels were checked.
 pub struct ReadySet {
     pub set: SplitSet,
     folder: PathBuf,
@@ -45,11 +45,10 @@ pub(super) fn kind_of(tested: &Tested) -> &str {
 }
 
 impl ReadySet {
-    /// Reads the demonstration of a set and checks its `truth.json`, if there is one, before teaching, which takes
-    /// long.
+    /// Reads the demonstration of a set and checks its labels, before teaching, which takes long.
     ///
     /// # Errors
-    /// The folder does not exist, or the demonstration or the `truth.json` is invalid.
+    /// The folder does not exist, or the demonstration or labels are invalid.
     pub fn open(set: SplitSet, sets: &Path) -> Result<Self> {
         let folder = sets.join(&set.folder);
         if !folder.is_dir() {
@@ -57,9 +56,7 @@ impl ReadySet {
         }
         let photo = folder.join(&set.demo);
         let demonstration = demonstrations::read_pair(&photo, &beside_photo(&photo)?)?;
-        if folder.join(TRUTH_FILE).exists() {
-            TruthEntry::read_all(&folder)?;
-        }
+        LabelledFolder::check_labels(&folder)?;
         Ok(Self { set, folder, demonstration })
     }
 

@@ -8,7 +8,7 @@ mod other_camera;
 mod seed;
 mod tilted;
 
-pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_view};
+pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_stratum, axis_view};
 pub(crate) use nominal::shows_whole;
 pub use nominal::{
     DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,

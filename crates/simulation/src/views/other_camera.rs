@@ -134,7 +134,8 @@ pub fn other_view(
     // Distance and tilt vary over their ranges in different orders, so that they are independent.
     let share = |k: u64| (k % of) as f64 / of.max(1) as f64;
     let tilt_deg = within(TILTS_DEG, share(number) + rng.random_range(0.0..1.0 / of.max(1) as f64));
-    let distance_m = within(camera.distances_m, share(7 * number + 3) + rng.random_range(0.0..1.0 / of.max(1) as f64));
+    let distance_share = share(distance_step(of) * number + 3) + rng.random_range(0.0..1.0 / of.max(1) as f64);
+    let distance_m = within(camera.distances_m, distance_share);
     let posed = (0..MAX_TRIES)
         .map(|_| PosedCamera {
             intrinsics: camera.intrinsics,
@@ -174,6 +175,17 @@ fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> 
     data.forward()?;
     let drawn = renderer.image(&mut data, model.id("beside")?)?;
     Ok(frustum.resample(&drawn, &camera.intrinsics))
+}
+
+/// Step between the distances of consecutive pictures, without a common divisor with their number, so that each picture
+/// has its own distance.
+fn distance_step(of: u64) -> u64 {
+    (7..).find(|&step| gcd(step, of) == 1).unwrap_or(1)
+}
+
+/// The greatest common divisor.
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 fn looking_at(part: &PlacedObject, distance_m: f64, tilt_deg: f64, rng: &mut Pcg64Mcg) -> Isometry3<f64> {
@@ -226,6 +238,16 @@ mod tests {
                 "{}: {middle}, {marks}",
                 camera.name
             );
+        }
+    }
+
+    #[test]
+    fn every_picture_has_its_own_distance() {
+        assert_eq!([1, 12, 20, 25].map(distance_step), [7; 4]);
+        for of in 1..=70 {
+            let mut shares: Vec<u64> = (0..of).map(|number| (distance_step(of) * number + 3) % of).collect();
+            shares.sort_unstable();
+            assert!(shares.into_iter().eq(0..of), "{of}");
         }
     }
 

@@ -20,8 +20,10 @@ use crate::teaching_progress::TeachingProgress;
 
 /// Number of test pictures with the part, and number without it.
 const VIEWS: (usize, usize) = (12, 12);
-/// Seed of the test pictures, far from the usual seeds of the attempts.
+/// Seed of the test pictures for the default seed, far from the usual seeds of the attempts.
 const VIEWS_SEED: u64 = 7_000_000;
+/// Distance of the test pictures' seeds of consecutive seeds, larger than the number of pictures.
+const VIEWS_SEED_STEP: u64 = 1000;
 
 /// Teaches, tests, grasps and writes the report.
 pub fn run(args: &DemoArgs) -> Result<Outcome> {
@@ -46,8 +48,9 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     write_atomically(&model_file, &bytes)?;
     eprintln!("taught in {:.0} s; the model is {}", model.facts().seconds, model_file.display());
 
-    let mut trials = try_views(&model, &object, true, VIEWS.0, VIEWS_SEED, Verification::ByShape)?;
-    trials.extend(try_views(&model, &object, false, VIEWS.1, VIEWS_SEED, Verification::ByShape)?);
+    let views_seed = VIEWS_SEED.wrapping_add(args.seed.wrapping_sub(1).wrapping_mul(VIEWS_SEED_STEP));
+    let mut trials = try_views(&model, &object, true, VIEWS.0, views_seed, Verification::ByShape)?;
+    trials.extend(try_views(&model, &object, false, VIEWS.1, views_seed, Verification::ByShape)?);
     eprintln!(
         "tested on unseen pictures: correct in {} of {} with the part, {} false alarms in {} without",
         trials.iter().filter(|trial| trial.is_right()).count(),

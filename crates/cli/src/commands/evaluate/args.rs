@@ -22,7 +22,8 @@ Labelled pictures (--pictures DIR):
   A hit is a detection within 4 % of the instance's diagonal and within 10 degrees of the marks; rotations after which the part looks the
   same (`sdg teach --symmetry`) are equivalent. Detections are matched to instances one to one, highest score first. The diagonal
   is that of the demonstration's box, scaled by the length of the instance's marks over that of the demonstration's; truth.json
-  states diagonal and symmetry of each instance. A picture is clean if it has a correct detection and no wrong one.
+  states diagonal and symmetry of each instance. A picture is clean if it has a correct detection and no wrong one;
+  a picture with optional instances only needs no detection.
 
   --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
   pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;

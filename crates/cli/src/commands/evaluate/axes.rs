@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
-use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, difference_lines, summary_lines};
+use sdg_evaluation::axes::{
+    Against, AxesEvaluation, AxesSummary, GRASPING_MODELS, RunEnd, Selection, difference_lines, summary_lines,
+};
 use sdg_evaluation::{Store, quoted};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
@@ -24,8 +26,13 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         return Err(Usage("--against: expected axes of pictures in --axes, found only grasps".into()).into());
     }
     let models = models(&args.models, &ModelKind::ALL)?;
+    if selection.axes.is_empty() && !GRASPING_MODELS.iter().any(|model| models.contains(model)) {
+        let letters = |models: &[ModelKind]| models.iter().map(|model| model.letter()).collect::<Vec<_>>().join(" or ");
+        let (grasping, found) = (letters(&GRASPING_MODELS), letters(&models));
+        return Err(Usage(format!("--models: expected {grasping} for the grasps of --axes, found {found}")).into());
+    }
     let objects = objects(&args.objects, ObjectSpec::names())?;
-    let (preset, settings) = settings(args)?;
+    let (preset, settings) = settings(args, &models)?;
     let store = Store::open(&args.out, &settings)?;
     let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
     // The page has its own folder, so that the page of the paper's protocol is kept.

@@ -22,7 +22,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let sets = sets(names)?;
     let models = models(&args.models, &[ModelKind::S, ModelKind::C])?;
     let objects = objects(&args.objects, ObjectSpec::names())?;
-    let (preset, settings) = settings(args)?;
+    let (preset, settings) = settings(args, &models)?;
     let store = Store::open(&args.out, &settings)?;
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("cameras"));
     sdg_files::prepare_folder(&report_folder)?;

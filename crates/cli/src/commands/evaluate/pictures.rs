@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use sdg_evaluation::labelled_pictures::{Evaluated, LabelledFolder, TestedFolder, Totals, page, summary, to_json};
 use sdg_evaluation::quoted;
 use sdg_inputs::camera_files;
@@ -10,6 +10,7 @@ use sdg_inputs::camera_files;
 use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
+use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::progress::EvaluationProgress;
 use crate::shared_args::{ComputeArgs, verification};
@@ -36,9 +37,10 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
 
     let verification = verification(args.no_verify, model);
     let progress = EvaluationProgress::new();
-    let TestedFolder { tested, left_out, others, foreign_label } =
-        labelled.test(&detector, verification, args.min_score, &progress)?;
+    let (interrupt, num_pictures) = (Interrupt::watch(), labelled.pictures.len());
+    let ended = labelled.test(&detector, verification, args.min_score, &|| interrupt.is_requested(), &progress);
     progress.finish();
+    let TestedFolder { tested, left_out, others, foreign_label, is_interrupted } = ended?;
 
     let evaluated = Evaluated {
         folder,
@@ -59,6 +61,9 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     } else {
         print!("{}", summary(&evaluated, &totals));
         println!("report: {}", report.display());
+    }
+    if is_interrupted {
+        bail!("interrupted after {} of {num_pictures} pictures", evaluated.tested.len());
     }
     let found_nothing = totals.found.of > 0 && judged.iter().all(|judged| judged.hits.is_empty());
     Ok(if found_nothing { Outcome::NothingToGrasp } else { Outcome::Done })

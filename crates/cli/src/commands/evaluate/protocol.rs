@@ -21,7 +21,7 @@ use crate::progress::EvaluationProgress;
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let models = models(&args.models, &ModelKind::ALL)?;
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
-    let (preset, settings) = settings(args)?;
+    let (preset, settings) = settings(args, &models)?;
     let store = Store::open(&args.out, &settings)?;
     sdg_files::prepare_folder(report_folder(args))?;
 

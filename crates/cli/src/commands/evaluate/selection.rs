@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use sdg_evaluation::Settings;
-use sdg_grasp::{GraspError, Preset};
+use sdg_grasp::{GraspError, ModelKind, Preset, TeachOptions};
 use sdg_simulation::objects::ObjectSpec;
 
 use super::args::EvaluateArgs;
@@ -12,9 +12,16 @@ use crate::parts::part_named;
 /// The preset, and the settings on which the stored results depend.
 ///
 /// # Errors
-/// The preset is unknown.
-pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
-    let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
+/// The preset is unknown, or the networks of these models cannot be taught with it, because it needs base weights.
+pub fn settings(args: &EvaluateArgs, models: &[ModelKind]) -> Result<(Preset, Settings)> {
+    let wrong = |error: GraspError| Usage(format!("--preset: {error}"));
+    let preset: Preset = args.preset.parse().map_err(wrong)?;
+    if let Some(&kind) = models.iter().find(|model| model.has_network()) {
+        let mut options = TeachOptions::new(args.seed);
+        (options.kind, options.preset) = (kind, preset);
+        // Otherwise, models that were never taught would count as models that find nothing.
+        options.with_start_read().map_err(wrong)?;
+    }
     let settings = Settings {
         protocol: Settings::PROTOCOL,
         preset: preset.name().to_owned(),

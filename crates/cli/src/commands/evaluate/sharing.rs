@@ -40,9 +40,10 @@ struct Asked {
 
 impl Asked {
     fn new(args: &EvaluateArgs) -> Result<Self> {
-        let (preset, settings) = settings(args)?;
+        let models = models(&args.models, &ModelKind::ALL)?;
+        let (preset, settings) = settings(args, &models)?;
         Ok(Self {
-            models: models(&args.models, &ModelKind::ALL)?,
+            models,
             objects: objects(&args.objects, ObjectSpec::paper_names())?,
             preset,
             settings,
@@ -99,7 +100,8 @@ fn list(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let listed = units.iter().map(|unit| {
-        let done = !UnitFolder::of(&args.out, &unit.name).read()?.receipts.is_empty();
+        let receipts = UnitFolder::of(&args.out, &unit.name).read()?.receipts;
+        let done = receipts.iter().any(|receipt| receipt.covers(&unit.files));
         Ok(json!({ "name": unit.name, "after": unit.after, "done": done }))
     });
     println!("{}", json!({ "units": listed.collect::<Result<Vec<_>>>()? }));
@@ -200,9 +202,19 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
         line.clone_into(&mut told);
         stdout.flush()?;
         if progress.is_settled {
+            let submit_again = match progress.interrupted.is_empty() {
+                true => "",
+                false => {
+                    "; submit the interrupted ones again with the same --submit, or watch again if Slurm requeued them"
+                }
+            };
             return match progress.units - progress.done {
                 0 => Ok(Outcome::Done),
-                missing => Err(anyhow!("{}: {missing} of {} units have no result", folder.display(), progress.units)),
+                missing => Err(anyhow!(
+                    "{}: {missing} of {} units have no result{submit_again}",
+                    folder.display(),
+                    progress.units
+                )),
             };
         }
         std::thread::sleep(POLL_INTERVAL);

@@ -30,6 +30,12 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
     if sides.is_empty() {
         bail!("{}: expected sets to measure, found none", file.display());
     }
+    if let (Some(results), Some(records)) = (&args.split.results, &args.split.records)
+        && sdg_files::is_same_path(results, records)
+    {
+        let found = records.display();
+        return Err(Usage(format!("--records: expected another file than --results, found {found} for both")).into());
+    }
     for path in [&args.split.results, &args.split.records].into_iter().flatten() {
         sdg_files::check_replaceable(path, None, b"{")?;
     }

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::paired::PairedCounts;
 use super::records::{AxisRecord, Case};
+use super::settings::has_complete_rounds;
 use super::summary::instances_in_picture;
 use super::units::{AxesEvaluation, axis_file};
 use super::way::Way;
@@ -132,13 +133,17 @@ impl Against {
     ) -> Result<Option<Vec<(Case, bool)>>> {
         // Only the settings that determine the pictures: those of teaching and search may differ between the runs.
         let settings = evaluation.axis_settings();
-        let (axes, seed) = (settings.axes, settings.teaching.seed);
+        let seed = settings.teaching.seed;
+        let mut pictures = json!({ "axes": settings.axes, "seed": seed });
+        if !has_complete_rounds(settings.axis_views) {
+            pictures["axis_views"] = settings.axis_views.into();
+        }
         // Other versions may describe a success in other words.
         let teaching: Option<Value> = self.record(&cell.teaching_file(Marks::Shipped), &json!({ "seed": seed }))?;
         if teaching.is_some_and(|teaching| teaching.get("failed").is_some()) {
             return Ok(Some(all_missed(axis, evaluation.axis_views)));
         }
-        let record: Option<AxisRecord> = self.record(&axis_file(cell, axis), &json!({ "axes": axes, "seed": seed }))?;
+        let record: Option<AxisRecord> = self.record(&axis_file(cell, axis), &pictures)?;
         Ok(record.map(|record| record.outcomes(axis, way)))
     }
 

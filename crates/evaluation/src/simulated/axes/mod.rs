@@ -34,6 +34,7 @@ pub use page::page;
 pub use paired::PairedCounts;
 pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
 pub use selection::{GraspCondition, Selection};
+pub(super) use settings::has_complete_rounds;
 pub use settings::{AttemptSettings, AxisSettings};
 pub(super) use summary::instances_in_picture;
 pub use summary::{

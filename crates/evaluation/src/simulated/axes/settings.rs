@@ -1,5 +1,6 @@
 //! The settings that determine the results of axes and of grasps under errors.
 
+use sdg_simulation::views::PICTURES_PER_AXIS;
 use serde::{Deserialize, Serialize};
 
 use crate::simulated::settings::TeachingSettings;
@@ -19,8 +20,20 @@ pub struct AxisSettings {
 }
 
 impl AxisSettings {
+    /// The current version of pictures and scoring, for complete rounds of pictures.
+    const AXES: u32 = 1;
+    /// The current version if the last round is incomplete: its pictures depend on the number of pictures.
+    const INCOMPLETE_ROUND: u32 = 2;
+
     /// The current version of pictures and scoring.
-    pub const AXES: u32 = 1;
+    pub fn version(axis_views: u32) -> u32 {
+        if has_complete_rounds(axis_views) { Self::AXES } else { Self::INCOMPLETE_ROUND }
+    }
+}
+
+/// Whether this number of pictures has the same number in each stratum of an axis.
+pub(in crate::simulated) fn has_complete_rounds(axis_views: u32) -> bool {
+    u64::from(axis_views).is_multiple_of(PICTURES_PER_AXIS)
 }
 
 /// The settings that determine attempts under errors, besides the error, model and part.

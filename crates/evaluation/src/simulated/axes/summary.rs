@@ -6,7 +6,7 @@ use std::fmt;
 use anyhow::Result;
 use sdg_geometry::percentile;
 use sdg_grasp::ModelKind;
-use sdg_simulation::views::Axis;
+use sdg_simulation::views::{Axis, axis_stratum};
 use serde::Serialize;
 
 use super::records::{Answer, AxisRecord};
@@ -96,8 +96,8 @@ pub struct AxisFigures {
     pub distance_mm: Option<[f64; 2]>,
     /// Median and 90th percentile of the angle errors of all accepted detections, in degrees.
     pub turn_deg: Option<[f64; 2]>,
-    /// The fraction found in the first, the middle and the last third of the axis' pictures. With at most 20 pictures,
-    /// the parameter of the axis changes in one direction from the first picture to the last.
+    /// The fraction found in the first, the middle and the last third of the axis' pictures, in the order of the
+    /// parameter of the axis.
     pub thirds: [Third; 3],
     /// The fraction of each part.
     pub parts: Vec<PartShare>,
@@ -269,6 +269,7 @@ fn axis_figures(
     let answers: Vec<&Answer> =
         records.iter().filter_map(|(_, record)| record.as_ref()).flat_map(|record| record.answers(way)).collect();
     let accepted = || answers.iter().flat_map(|answer| &answer.detections).filter(|detection| detection.is_accepted());
+    let third_of = thirds(axis_views);
     AxisFigures {
         axis: axis.name(),
         model,
@@ -279,19 +280,29 @@ fn axis_figures(
         pictures: records.iter().map(|(_, record)| record.as_ref().map_or(axis_views, |r| r.pictures.len())).sum(),
         distance_mm: spread(&accepted().filter_map(|detection| detection.error_mm).collect::<Vec<_>>()),
         turn_deg: spread(&accepted().filter_map(|detection| detection.error_deg).collect::<Vec<_>>()),
-        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, records, axis_views)),
+        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, records, &third_of)),
         parts,
     }
 }
 
+/// The third of each picture of an axis in the order of the strata: 0, 1 or 2.
+fn thirds(axis_views: usize) -> Vec<usize> {
+    let mut numbers: Vec<usize> = (0..axis_views).collect();
+    numbers.sort_by_key(|&number| axis_stratum(number as u64, axis_views as u64));
+    let mut third_of = vec![0; axis_views];
+    for (rank, &number) in numbers.iter().enumerate() {
+        third_of[number] = rank * 3 / axis_views;
+    }
+    third_of
+}
+
 /// A third of the pictures, over all parts. Without a model, every instance counts as missed.
-fn of_third(third: usize, axis: Axis, way: Way, records: &[(&str, Option<AxisRecord>)], axis_views: usize) -> Third {
+fn of_third(third: usize, axis: Axis, way: Way, records: &[(&str, Option<AxisRecord>)], third_of: &[usize]) -> Third {
     let mut sum = Third::default();
+    let is_in_third = |number: u64| third_of.get(number as usize) == Some(&third);
     for (_, record) in records {
-        let count = record.as_ref().map_or(axis_views, |record| record.pictures.len());
-        let is_in_third = |number: u64| number as usize * 3 / count.max(1) == third;
         let Some(record) = record else {
-            let num_pictures = (0..axis_views as u64).filter(|number| is_in_third(*number)).count();
+            let num_pictures = third_of.iter().filter(|of| **of == third).count();
             sum.found = sum.found + Share { count: 0, of: num_pictures * instances_in_picture(axis) };
             continue;
         };
@@ -432,4 +443,19 @@ fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
         }
     }
     Ok(seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thirds_are_in_the_order_of_the_parameter() {
+        assert_eq!(thirds(2), [0, 1]);
+        assert_eq!(thirds(6), [0, 0, 1, 1, 2, 2]);
+        let of_25 = thirds(25);
+        // The strata of the last five pictures are 2, 6, 10, 14 and 18.
+        assert_eq!(of_25[20..], [0, 0, 1, 2, 2]);
+        assert_eq!([of_25[0], of_25[10], of_25[19]], [0, 1, 2]);
+    }
 }

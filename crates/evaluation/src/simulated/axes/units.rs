@@ -53,7 +53,7 @@ impl AxesEvaluation<'_> {
     /// The settings of the pictures' results.
     pub fn axis_settings(&self) -> AxisSettings {
         AxisSettings {
-            axes: AxisSettings::AXES,
+            axes: AxisSettings::version(self.axis_views),
             teaching: self.store.settings().teaching(),
             axis_views: self.axis_views,
             search_points: self.search_points,

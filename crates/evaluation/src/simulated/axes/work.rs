@@ -109,7 +109,7 @@ impl AxesEvaluation<'_> {
                 return Ok(None);
             }
             let started = Instant::now();
-            let view = draw(object, axis, number, self.store.settings().seed)?;
+            let view = draw(object, axis, (number, u64::from(self.axis_views)), self.store.settings().seed)?;
             let drawing_secs = started.elapsed().as_secs_f64();
             for (_, model, record) in &mut shown {
                 let started = Instant::now();
@@ -176,12 +176,14 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     }
 }
 
-/// Renders a picture of an axis. If a scene has no room for camera, cover or instances, another scene for the same
+/// Renders picture `number` (of `of`) of an axis. If a scene has no room for camera, cover or instances, another scene for the same
 /// stratum of the axis is tried.
-pub(crate) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
+pub(crate) fn draw(object: &ObjectSpec, axis: Axis, (number, of): (u64, u64), seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {
-        match axis_view(object, axis, number + round * PICTURES_PER_AXIS * 1000, seed) {
+        // Complete rounds, so that the stratum is the same.
+        let further = round * PICTURES_PER_AXIS * 1000;
+        match axis_view(object, axis, (number + further, of + further), seed) {
             Err(error @ SimulationError::Configuration { .. }) => impossible = Some(error),
             drawn => return drawn.with_context(|| format!("picture {number}")),
         }

@@ -60,7 +60,7 @@ impl PictureSet {
     pub(super) fn draw(self, part: &ObjectSpec, number: u64, of: u64, seed: u64) -> Result<Shown> {
         let (on_table, camera) = match self {
             Self::Axis(axis) => {
-                let shown = draw(part, axis, number, seed)?;
+                let shown = draw(part, axis, (number, of), seed)?;
                 let instances = shown.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
                 return Ok(Shown { view: shown.view, instances });
             }

@@ -13,7 +13,7 @@ use super::records::{CameraPicture, CameraRecord, MetricAnswer};
 use super::sets::{PictureSet, Shown};
 use crate::against_truth::grasp_error;
 use crate::progress::Progress;
-use crate::simulated::axes::{TOLERANCE, match_one_to_one};
+use crate::simulated::axes::{TOLERANCE, has_complete_rounds, match_one_to_one};
 use crate::simulated::cell::{Cell, Marks};
 use crate::simulated::one_unit::{NO_MODEL, do_unit};
 use crate::simulated::schedule::{Task, run_all};
@@ -91,10 +91,10 @@ impl CamerasEvaluation<'_> {
     }
 
     fn settings(&self) -> CameraSettings {
-        /// The current version of pictures and scoring.
-        const CAMERAS: u32 = 1;
+        // Version 1 had other pictures if the last round of an axis is incomplete, or 7 divides their number.
+        let is_as_version_1 = has_complete_rounds(self.views) && !self.views.is_multiple_of(7);
         CameraSettings {
-            cameras: CAMERAS,
+            cameras: if is_as_version_1 { 1 } else { 2 },
             teaching: self.store.settings().teaching(),
             views: self.views,
             photos: self.photos,

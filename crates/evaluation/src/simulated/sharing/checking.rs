@@ -8,7 +8,8 @@ use sdg_weights_conversion::sha256_of;
 
 use super::super::settings::difference;
 use super::super::units::Evaluation;
-use super::records::Receipt;
+use super::made_with::{made_with_another, other_model};
+use super::records::{ModelHashes, Receipt};
 use super::unit_folder::{UnitFolder, UnitState};
 use super::unit_list::ListedUnit;
 
@@ -37,7 +38,7 @@ pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<Strin
         let state = UnitFolder::of(folder, &unit.name).read()?;
         let told = match state.receipts.as_slice() {
             [] => Some(why_missing(&state)),
-            [receipt] => stale(evaluation, unit, receipt)?,
+            [receipt] => stale(evaluation, unit, receipt, &state.models)?,
             several => {
                 let by: Vec<String> = several.iter().map(|receipt| receipt.by.to_string()).collect();
                 Some(format!("duplicate: done by {}; remove units/{} and do it again", by.join(" and by "), unit.name))
@@ -50,6 +51,7 @@ pub fn faults(evaluation: &Evaluation, units: &[ListedUnit]) -> Result<Vec<Strin
 
 fn why_missing(state: &UnitState) -> String {
     match (&state.running, state.failures.last()) {
+        (None, _) if state.interrupted.is_some() => "missing: interrupted".to_owned(),
         (Some(running), _) if !state.is_abandoned => format!("still running on {}", running.by),
         (Some(running), _) => format!("missing: {} ended without a result", running.by),
         (None, Some(failure)) => format!(
@@ -62,11 +64,22 @@ fn why_missing(state: &UnitState) -> String {
     }
 }
 
-/// The first difference between a unit's receipt and this run's settings or program, or between the receipt and the
-/// unit's files.
-fn stale(evaluation: &Evaluation, unit: &ListedUnit, receipt: &Receipt) -> Result<Option<String>> {
+/// The first difference between a unit's receipt and this run's settings, program, models or files, or between the
+/// receipt and the unit's files.
+fn stale(
+    evaluation: &Evaluation,
+    unit: &ListedUnit,
+    receipt: &Receipt,
+    made_with: &ModelHashes,
+) -> Result<Option<String>> {
     if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
         return Ok(Some(format!("stale: done with other settings ({difference})")));
+    }
+    if let Some(model) = other_model(made_with, &evaluation.models_of(unit)?) {
+        return Ok(Some(format!("stale: {}", made_with_another(model, &unit.name))));
+    }
+    if let Some(file) = unit.files.iter().find(|file| !receipt.all_files.contains(*file)) {
+        return Ok(Some(format!("missing: done without {file}")));
     }
     for (file, expected) in &receipt.files {
         let path = evaluation.store.path(file);

@@ -14,6 +14,7 @@ use super::super::one_unit::caught;
 use super::super::schedule::{Task, run_all};
 use super::super::settings::difference;
 use super::super::units::{Evaluation, Unit};
+use super::made_with::{made_with_another, other_model};
 use super::records::{Failure, Receipt};
 use super::unit_folder::UnitFolder;
 use super::unit_list::{ListedUnit, Work};
@@ -55,35 +56,57 @@ impl Evaluation<'_> {
             !is_interrupted()
         };
         let Some(_held) = folder.hold(&mut wait)? else { return Ok(Ended::Interrupted) };
-        let settings = self.settings_of(unit)?;
-        if let Some(receipt) = folder.read()?.receipts.into_iter().next() {
+        let (settings, models) = (self.settings_of(unit)?, self.models_of(unit)?);
+        let state = folder.read()?;
+        let earlier = state.receipts.into_iter().next();
+        if let Some(receipt) = &earlier {
             if let Some(difference) = difference(&settings, &receipt.settings)? {
                 return Err(EvaluationError::UnitOfOtherSettings { unit: name.clone(), difference }.into());
             }
-            return Ok(Ended::Already(Box::new(receipt)));
+            if let Some(model) = other_model(&state.models, &models) {
+                bail!("{name}: {}", made_with_another(model, name));
+            }
+            if receipt.covers(&unit.files) {
+                return Ok(Ended::Already(Box::new(receipt.clone())));
+            }
         }
         let (by, started) = (Worker::this(), Instant::now());
-        let started_secs = folder.begin(&by)?.started_secs;
-        let ended =
-            self.check_after(unit).and_then(|()| self.do_work(unit, threads, is_interrupted)).and_then(|summary| {
-                let Some(summary) = summary else { return Ok(None) };
-                Ok(Some(Receipt {
-                    unit: name.clone(),
-                    by: by.clone(),
-                    started_secs,
-                    seconds: started.elapsed().as_secs_f64(),
-                    summary,
-                    settings,
-                    files: self.written_by(unit)?,
-                }))
-            });
+        let running = folder.begin(&by)?;
+        let started_secs = running.started_secs;
+        let ended = self.check_after(unit).and_then(|()| {
+            let mut known = state.models;
+            if earlier.is_none() && known != models {
+                // Results of other models, such as single attempts, that have no receipt.
+                unit.files.iter().try_for_each(|file| self.store.remove(file))?;
+                known.clear();
+            }
+            known.extend(models);
+            if !known.is_empty() {
+                folder.write_models(&known)?;
+            }
+            let Some(summary) = self.do_work(unit, threads, is_interrupted)? else { return Ok(None) };
+            Ok(Some(Receipt {
+                unit: name.clone(),
+                by: by.clone(),
+                started_secs,
+                seconds: started.elapsed().as_secs_f64(),
+                summary,
+                settings,
+                files: self.written_by(unit)?,
+                all_files: unit.files.iter().cloned().collect(),
+            }))
+        });
         match ended {
-            Ok(Some(receipt)) => {
+            Ok(Some(mut receipt)) => {
+                if let Some(earlier) = earlier {
+                    folder.remove_receipt(&earlier)?;
+                    receipt = receipt.after(earlier);
+                }
                 folder.finish(&receipt)?;
                 Ok(Ended::Done(receipt.summary))
             }
             Ok(None) => {
-                folder.end()?;
+                folder.interrupt(&running)?;
                 Ok(Ended::Interrupted)
             }
             Err(error) => {
@@ -161,4 +184,79 @@ impl Evaluation<'_> {
 fn holder_text(folder: &UnitFolder) -> String {
     let running = folder.read().ok().and_then(|state| state.running);
     running.map_or_else(String::new, |running| format!(", by {}", running.by))
+}
+
+#[cfg(test)]
+mod tests {
+    use sdg_grasp::{ModelKind, Preset};
+    use sdg_simulation::objects::ObjectSpec;
+
+    use super::super::checking::faults;
+    use super::super::unit_list::all_units;
+    use super::*;
+    use crate::simulated::cell::{Cell, Marks};
+    use crate::simulated::records::TeachingRecord;
+    use crate::{Settings, Store};
+
+    const LOOK: &str = "look-pendulum";
+
+    /// Does the unit of the pictures, of which there are none, for these models.
+    fn look(store: &Store, objects: &[ObjectSpec], models: &[ModelKind]) -> Result<Ended> {
+        let units = all_units(models, objects, false);
+        let unit = units.iter().find(|unit| unit.name == LOOK).unwrap();
+        evaluation(store, objects, models).do_listed(unit, 1, &|| false, &|_| ())
+    }
+
+    fn evaluation<'a>(store: &'a Store, objects: &'a [ObjectSpec], models: &'a [ModelKind]) -> Evaluation<'a> {
+        Evaluation { models, objects, preset: Preset::Edge, store, unverified: false, jobs: 1 }
+    }
+
+    #[test]
+    fn a_unit_is_done_again_for_further_models_and_refused_after_another_teaching() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open_shared(folder.path(), &Settings::for_test(1, 1, 0)).unwrap();
+        let objects = [ObjectSpec::by_name("pendulum").unwrap()];
+        // The teachings have ended without a model.
+        for model in [ModelKind::S, ModelKind::C] {
+            let cell = Cell { model, object: "pendulum" };
+            let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
+            store.write_made_with(&cell.teaching_file(Marks::Shipped), &store.settings().teaching(), &failed).unwrap();
+            let unit = UnitFolder::of(folder.path(), &format!("teach-{cell}"));
+            let _held = unit.hold(&mut || false).unwrap();
+            let by = Worker::this();
+            let started_secs = unit.begin(&by).unwrap().started_secs;
+            let receipt = Receipt {
+                unit: format!("teach-{cell}"),
+                by,
+                started_secs,
+                seconds: 0.0,
+                summary: String::new(),
+                settings: Value::Null,
+                files: BTreeMap::new(),
+                all_files: [cell.model_file(Marks::Shipped), cell.teaching_file(Marks::Shipped)].into(),
+            };
+            unit.finish(&receipt).unwrap();
+        }
+        let is_done_now = |models: &[ModelKind]| matches!(look(&store, &objects, models).unwrap(), Ended::Done(_));
+        assert!(is_done_now(&[ModelKind::S]));
+        assert!(!is_done_now(&[ModelKind::S]));
+        let both = [ModelKind::S, ModelKind::C];
+        let told = |models: &[ModelKind]| {
+            let faults = faults(&evaluation(&store, &objects, models), &all_units(models, &objects, false)).unwrap();
+            faults.into_iter().find(|fault| fault.starts_with(LOOK))
+        };
+        assert_eq!(told(&both).unwrap(), "look-pendulum: missing: done without cells/C-pendulum.look.json");
+        assert!(is_done_now(&[ModelKind::C]));
+        assert!(!is_done_now(&both) && !is_done_now(&[ModelKind::S]));
+        assert_eq!(UnitFolder::of(folder.path(), LOOK).read().unwrap().receipts.len(), 1);
+        assert_eq!(told(&both), None);
+
+        // C is taught again.
+        store.write_bytes("models/C-pendulum.sdg", b"a model").unwrap();
+        let expected = "look-pendulum: done with another models/C-pendulum.sdg, which was taught again since";
+        let refused = look(&store, &objects, &both).unwrap_err().to_string();
+        assert!(refused.starts_with(expected) && refused.ends_with("remove units/look-pendulum and do it again"));
+        assert!(told(&both).unwrap().starts_with("look-pendulum: stale: done with another models/C-pendulum.sdg"));
+        assert_eq!(told(&[ModelKind::S]), None);
+    }
 }

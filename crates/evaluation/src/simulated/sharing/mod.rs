@@ -10,6 +10,8 @@
 //! DIR/units/NAME/running.json    that process
 //! DIR/units/NAME/done-*.json     a receipt: the process, its settings, and the SHA-256 of each file that the unit wrote
 //! DIR/units/NAME/failed-*.json   the process and its error
+//! DIR/units/NAME/interrupted.json   a process that was interrupted, until another one begins
+//! DIR/units/NAME/models.json     the SHA-256 of each model with which the unit's results are made
 //! ```
 //!
 //! A **unit** has a constant name and its own folder, so that a process reads and writes only a few files, however many
@@ -20,6 +22,7 @@
 
 mod checking;
 mod doing;
+mod made_with;
 mod near_names;
 mod records;
 mod slurm;

@@ -9,7 +9,7 @@ use sdg_files::{Access, Lock, write_atomically};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::records::{Failure, Receipt, Running};
+use super::records::{Failure, ModelHashes, Receipt, Running};
 use super::worker::{Worker, unix_secs};
 
 /// Maximum size of a record.
@@ -17,6 +17,8 @@ const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// Interval between attempts to take a lock that another process holds.
 const LOCK_WAIT: Duration = Duration::from_millis(500);
 const RUNNING: &str = "running.json";
+const INTERRUPTED: &str = "interrupted.json";
+const MODELS: &str = "models.json";
 /// The failure of a process that left no record of an end, as when it was killed.
 pub(super) const ABANDONED: &str = "its process ended without a result";
 
@@ -35,6 +37,10 @@ pub struct UnitState {
     pub running: Option<Running>,
     /// Whether that process no longer exists, although it left no record of an end.
     pub is_abandoned: bool,
+    /// The process that was interrupted, if no other one has begun the unit since.
+    pub interrupted: Option<Running>,
+    /// The models with which the unit's results were made.
+    pub models: ModelHashes,
 }
 
 /// The right to run a unit, until it is dropped.
@@ -85,16 +91,15 @@ impl UnitFolder {
         for path in self.entries()? {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             if name.starts_with("done-") {
-                state.receipts.push(read_record(&path)?);
+                state.receipts.extend(read_passing_record(&path)?);
             } else if name.starts_with("failed-") {
                 state.failures.push(read_record(&path)?);
             } else if name == RUNNING {
-                // The process may end between the two reads.
-                state.running = path
-                    .exists()
-                    .then(|| read_record(&path))
-                    .transpose()
-                    .or_else(|error| if path.exists() { Err(error) } else { Ok(None) })?;
+                state.running = read_passing_record(&path)?;
+            } else if name == INTERRUPTED {
+                state.interrupted = read_passing_record(&path)?;
+            } else if name == MODELS {
+                state.models = read_record(&path)?;
             }
         }
         state.failures.sort_by_key(|failure| failure.started_secs);
@@ -106,12 +111,33 @@ impl UnitFolder {
     pub(super) fn begin(&self, by: &Worker) -> Result<Running> {
         let running = Running { by: by.clone(), started_secs: unix_secs() };
         self.write(RUNNING, &running)?;
+        let interrupted = self.0.join(INTERRUPTED);
+        if interrupted.exists() {
+            fs::remove_file(&interrupted).with_context(|| format!("{}: cannot remove", interrupted.display()))?;
+        }
         Ok(running)
+    }
+
+    /// Records the models with which the unit's results are made.
+    pub(super) fn write_models(&self, models: &ModelHashes) -> Result<()> {
+        self.write(MODELS, models)
     }
 
     /// Records that the unit is done.
     pub(super) fn finish(&self, receipt: &Receipt) -> Result<()> {
-        self.write(&format!("done-{}.json", receipt.by.file_name_part(receipt.started_secs)), receipt)?;
+        self.write(&receipt_name(receipt), receipt)?;
+        self.end()
+    }
+
+    /// Removes a receipt, which another one replaces.
+    pub(super) fn remove_receipt(&self, receipt: &Receipt) -> Result<()> {
+        let path = self.0.join(receipt_name(receipt));
+        fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))
+    }
+
+    /// Records that the process was interrupted, which is no failure.
+    pub(super) fn interrupt(&self, running: &Running) -> Result<()> {
+        self.write(INTERRUPTED, running)?;
         self.end()
     }
 
@@ -126,7 +152,8 @@ impl UnitFolder {
         let UnitState { receipts, running: Some(Running { by, started_secs }), .. } = self.read()? else {
             return Ok(());
         };
-        if !receipts.is_empty() {
+        // It may have ended between its receipt and the removal of its record.
+        if receipts.iter().any(|receipt| (&receipt.by, receipt.started_secs) == (&by, started_secs)) {
             return Ok(());
         }
         let unit = self.0.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -152,6 +179,18 @@ impl UnitFolder {
 
     fn lock_file(&self) -> PathBuf {
         self.0.join("lock")
+    }
+}
+
+fn receipt_name(receipt: &Receipt) -> String {
+    format!("done-{}.json", receipt.by.file_name_part(receipt.started_secs))
+}
+
+/// A record that a process may remove at any time.
+fn read_passing_record<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    match read_record(path) {
+        Err(_) if !path.exists() => Ok(None),
+        record => record.map(Some),
     }
 }
 

@@ -1,5 +1,6 @@
 //! All units of an evaluation by name, finished or not.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::path::Path;
 
@@ -73,7 +74,9 @@ pub struct ListedUnit<'a> {
     pub after: Vec<String>,
     /// The files that the unit may write, relative to the evaluation's folder. For a part without a model, some are not
     /// written.
-    pub(super) files: Vec<String>,
+    pub files: Vec<String>,
+    /// The model files that the unit reads.
+    pub(super) models: Vec<String>,
     pub(super) work: Work<'a>,
 }
 
@@ -91,6 +94,10 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
         let of_network = |model: &ModelKind| teaching(Cell { model: *model, object: &object.name });
         networks.iter().map(of_network).collect::<Vec<_>>()
     };
+    let models_of = |object: &'a ObjectSpec| {
+        let of_network = |&model: &ModelKind| Cell { model, object: &object.name }.model_file(Marks::Shipped);
+        networks.iter().map(of_network).collect::<Vec<_>>()
+    };
     let mut units = Vec::new();
     for object in objects {
         for &model in &networks {
@@ -100,6 +107,7 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
                 name: teaching(cell),
                 after: Vec::new(),
                 files,
+                models: Vec::new(),
                 work: Work::Unit(Unit::Teach(cell)),
             });
         }
@@ -107,7 +115,8 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
     for object in objects {
         let files = cells(object).flat_map(|cell| [cell.file("look"), cell.picture_file()]).collect();
         let work = Work::Unit(Unit::Look(object));
-        units.push(ListedUnit { name: format!("look-{}", object.name), after: teachings(object), files, work });
+        let (name, after, models) = (format!("look-{}", object.name), teachings(object), models_of(object));
+        units.push(ListedUnit { name, after, files, models, work });
     }
     for way in [Verification::ByShape, Verification::Off] {
         for object in objects {
@@ -121,6 +130,7 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
                         name: format!("grasp-{cell}{suffix}"),
                         after: vec![teaching(cell)],
                         files: vec![cell.file(&attempts_of(way))],
+                        models: vec![cell.model_file(Marks::Shipped)],
                         work: Work::Unit(Unit::Attempts(cell, object, way)),
                     });
                 }
@@ -129,8 +139,8 @@ pub fn all_units<'a>(models: &[ModelKind], objects: &'a [ObjectSpec], unverified
     }
     for object in objects {
         let files = cells(object).map(|cell| cell.file("speed")).collect();
-        let (name, after) = (format!("time-{}", object.name), teachings(object));
-        units.push(ListedUnit { name, after, files, work: Work::Time(object) });
+        let (name, after, models) = (format!("time-{}", object.name), teachings(object), models_of(object));
+        units.push(ListedUnit { name, after, files, models, work: Work::Time(object) });
     }
     units
 }
@@ -146,11 +156,31 @@ pub struct UnitList {
 pub struct SavedUnit {
     pub name: String,
     pub after: Vec<String>,
+    /// The files that the unit may write.
+    #[serde(default)]
+    pub files: Vec<String>,
+}
+
+impl SavedUnit {
+    /// Adds what the unit needs and writes according to another list, for other models.
+    fn extend(&mut self, other: Self) {
+        for (known, more) in [(&mut self.after, other.after), (&mut self.files, other.files)] {
+            for name in more {
+                if !known.contains(&name) {
+                    known.push(name);
+                }
+            }
+        }
+    }
 }
 
 impl UnitList {
     pub fn new(units: &[ListedUnit]) -> Self {
-        let saved = |unit: &ListedUnit| SavedUnit { name: unit.name.clone(), after: unit.after.clone() };
+        let saved = |unit: &ListedUnit| SavedUnit {
+            name: unit.name.clone(),
+            after: unit.after.clone(),
+            files: unit.files.clone(),
+        };
         Self { units: units.iter().map(saved).collect() }
     }
 
@@ -181,11 +211,19 @@ impl UnitList {
         if !plans.exists() {
             return Ok(all);
         }
-        let mut known = std::collections::HashSet::new();
+        let mut known: HashMap<String, usize> = HashMap::new();
         for path in sdg_files::entries(&plans)? {
             let plan: Self = serde_json::from_slice(&sdg_files::read(&path, MAX_LIST_BYTES)?)
                 .with_context(|| format!("{}: expected a plan of an evaluation", path.display()))?;
-            all.units.extend(plan.units.into_iter().filter(|unit| known.insert(unit.name.clone())));
+            for unit in plan.units {
+                match known.get(&unit.name) {
+                    Some(&idx) => all.units[idx].extend(unit),
+                    None => {
+                        known.insert(unit.name.clone(), all.units.len());
+                        all.units.push(unit);
+                    }
+                }
+            }
         }
         Ok(all)
     }
@@ -258,5 +296,10 @@ mod tests {
             plan.save(folder.path()).unwrap();
         }
         assert_eq!(UnitList::read_all(folder.path()).unwrap().units.len(), all.units.len());
+        // Units that several models share have the files of all of them.
+        UnitList::new(&all_units(&[ModelKind::C], &objects, false)).save(folder.path()).unwrap();
+        let units = UnitList::read_all(folder.path()).unwrap().units;
+        let look = units.iter().find(|unit| unit.name == "look-pendulum").unwrap();
+        assert_eq!((look.after.len(), look.files.len()), (2, 4));
     }
 }

@@ -20,8 +20,8 @@ const MAX_LISTED: usize = 12;
 #[derive(Debug)]
 pub struct Watch {
     folder: PathBuf,
-    /// Duration in seconds of each finished unit.
-    done: HashMap<String, f64>,
+    /// Duration in seconds of each finished unit, and the number of its files: further models add files to a unit.
+    done: HashMap<String, (f64, usize)>,
 }
 
 /// Progress of the units in a folder.
@@ -31,13 +31,16 @@ pub struct Progress {
     pub done: usize,
     pub running: Vec<RunningUnit>,
     pub failed: Vec<FailedUnit>,
+    /// Units whose process was interrupted, as by the time limit of its task, and that have not begun again.
+    pub interrupted: Vec<InterruptedUnit>,
     /// Number of units that are neither done nor begun.
     pub waiting: usize,
     /// Estimated remaining seconds with the current number of running units; `None` before the first unit is done.
     pub seconds_left: Option<f64>,
     /// Number of finished units and of all units of each kind.
     pub kinds: Vec<KindProgress>,
-    /// Whether the progress is final: all units are done, have failed twice, or wait for a unit that has failed twice.
+    /// Whether the progress is final unless units are submitted again: all units are done, have failed twice, were
+    /// interrupted, or wait for such a unit.
     pub is_settled: bool,
 }
 
@@ -65,6 +68,12 @@ pub struct FailedUnit {
     pub tries: usize,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InterruptedUnit {
+    pub unit: String,
+    pub by: Worker,
+}
+
 impl Watch {
     /// Watches the units in a folder.
     ///
@@ -84,16 +93,19 @@ impl Watch {
     pub fn progress(&mut self) -> Result<Progress> {
         let plan = UnitList::read_all(&self.folder)?;
         let (mut running, mut failed, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
+        let mut interrupted = Vec::new();
         for unit in &plan.units {
-            if self.done.contains_key(&unit.name) {
+            if self.done.get(&unit.name).is_some_and(|(_, num_files)| *num_files == unit.files.len()) {
                 continue;
             }
+            self.done.remove(&unit.name);
             let state = UnitFolder::of(&self.folder, &unit.name).read()?;
             let tries = state.failures.len() + usize::from(state.is_abandoned);
             let name = unit.name.clone();
-            match (state.receipts.first(), state.running, state.failures.last()) {
+            let receipt = state.receipts.iter().find(|receipt| receipt.covers(&unit.files));
+            match (receipt, state.running, state.failures.last()) {
                 (Some(receipt), ..) => {
-                    self.done.insert(name, receipt.seconds);
+                    self.done.insert(name, (receipt.seconds, unit.files.len()));
                 }
                 (None, Some(now), _) if !state.is_abandoned => {
                     let seconds = unix_secs().saturating_sub(now.started_secs);
@@ -102,6 +114,9 @@ impl Watch {
                 (None, Some(last), _) => {
                     failed.push(FailedUnit { unit: name, by: last.by, why: ABANDONED.to_owned(), tries });
                 }
+                (None, None, _) if state.interrupted.is_some() => {
+                    interrupted.extend(state.interrupted.map(|last| InterruptedUnit { unit: name, by: last.by }));
+                }
                 (None, None, Some(failure)) => {
                     let (by, why) = (failure.by.clone(), failure.why.clone());
                     failed.push(FailedUnit { unit: name, by, why, tries });
@@ -109,7 +124,10 @@ impl Watch {
                 (None, None, None) => waiting.push(unit),
             }
         }
-        let is_lost = |name: &str| failed.iter().any(|failed| failed.unit == name && failed.tries >= MAX_TRIES);
+        let is_lost = |name: &str| {
+            failed.iter().any(|failed| failed.unit == name && failed.tries >= MAX_TRIES)
+                || interrupted.iter().any(|interrupted| interrupted.unit == name)
+        };
         let can_change = |name: &str, after: &[String]| !is_lost(name) && !after.iter().any(|before| is_lost(before));
         let of_name: HashMap<&str, &SavedUnit> = plan.units.iter().map(|unit| (unit.name.as_str(), unit)).collect();
         let is_settled = running.is_empty()
@@ -129,6 +147,7 @@ impl Watch {
             is_settled,
             running,
             failed,
+            interrupted,
         })
     }
 
@@ -137,7 +156,7 @@ impl Watch {
     fn seconds_left(&self, plan: &UnitList, running: usize) -> Option<f64> {
         let mean = |kind: Option<UnitKind>| {
             let of_kind = self.done.iter().filter(|(name, _)| kind.is_none() || UnitKind::of(name) == kind);
-            let seconds: Vec<f64> = of_kind.map(|(_, seconds)| *seconds).collect();
+            let seconds: Vec<f64> = of_kind.map(|(_, (seconds, _))| *seconds).collect();
             (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64)
         };
         let of_all = mean(None)?;
@@ -160,6 +179,9 @@ impl fmt::Display for Progress {
             self.failed.len(),
             self.waiting
         )?;
+        if !self.interrupted.is_empty() {
+            write!(f, ", {} interrupted", self.interrupted.len())?;
+        }
         match self.seconds_left {
             Some(seconds) if self.done < self.units => writeln!(f, "; about {} left", duration(seconds))?,
             _ => writeln!(f)?,
@@ -181,7 +203,14 @@ impl fmt::Display for Progress {
             let tries = if unit.tries == 1 { "once".to_owned() } else { format!("{} times", unit.tries) };
             writeln!(f, "  {}  {tries}, last on {}: {}", unit.unit, unit.by, unit.why)?;
         }
-        more(f, self.failed.len())
+        more(f, self.failed.len())?;
+        if !self.interrupted.is_empty() {
+            writeln!(f, "interrupted:")?;
+        }
+        for unit in self.interrupted.iter().take(MAX_LISTED) {
+            writeln!(f, "  {}  on {}", unit.unit, unit.by)?;
+        }
+        more(f, self.interrupted.len())
     }
 }
 
@@ -206,7 +235,7 @@ mod tests {
     #[test]
     fn a_unit_whose_process_was_killed_twice_is_settled() {
         let folder = tempfile::tempdir().unwrap();
-        let saved = SavedUnit { name: "look-pendulum".to_owned(), after: Vec::new() };
+        let saved = SavedUnit { name: "look-pendulum".to_owned(), after: Vec::new(), files: Vec::new() };
         UnitList { units: vec![saved] }.save(folder.path()).unwrap();
         let unit = UnitFolder::of(folder.path(), "look-pendulum");
         for tries in 1..=MAX_TRIES {
@@ -217,5 +246,31 @@ mod tests {
             let progress = Watch::new(folder.path()).unwrap().progress().unwrap();
             assert_eq!((progress.failed[0].tries, progress.is_settled), (tries, tries == MAX_TRIES));
         }
+    }
+
+    #[test]
+    fn an_interrupted_unit_is_settled_until_it_begins_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let saved = |name: &str, after: &[&str]| SavedUnit {
+            name: name.to_owned(),
+            after: after.iter().map(|&name| name.to_owned()).collect(),
+            files: Vec::new(),
+        };
+        let units = vec![saved("teach-S-pendulum", &[]), saved("look-pendulum", &["teach-S-pendulum"])];
+        UnitList { units }.save(folder.path()).unwrap();
+        let progress = || Watch::new(folder.path()).unwrap().progress().unwrap();
+        assert!(!progress().is_settled);
+        let unit = UnitFolder::of(folder.path(), "teach-S-pendulum");
+        let _held = unit.hold(&mut || false).unwrap();
+        let running = unit.begin(&Worker::this()).unwrap();
+        unit.interrupt(&running).unwrap();
+        let interrupted = progress();
+        assert!(interrupted.is_settled && interrupted.failed.is_empty() && interrupted.waiting == 1);
+        let text = interrupted.to_string();
+        assert!(text.starts_with("0 of 2 units done, 0 running, 0 failed, 1 waiting, 1 interrupted\n"), "{text}");
+        assert!(text.ends_with(&format!("interrupted:\n  teach-S-pendulum  on {}\n", Worker::this())), "{text}");
+        unit.begin(&Worker::this()).unwrap();
+        let again = progress();
+        assert!(!again.is_settled && again.interrupted.is_empty() && again.running.len() == 1);
     }
 }

@@ -44,6 +44,8 @@ const MAX_TEXTURE_PX: u32 = 1024;
 /// The walls take the photo's colour at this distance inside the outline, in pixels, because the colour on the outline
 /// itself is half the table's.
 const WALL_INSET_PX: f64 = 2.0;
+/// Friction coefficient of a part for which none is given: that of most shipped parts.
+const ASSUMED_FRICTION: f64 = 0.6;
 
 /// The data of an extruded part; positions in pixels of `photo`, which is taken vertically from above.
 #[derive(Debug, Clone)]
@@ -64,8 +66,9 @@ pub struct Extrusion<'a> {
     pub height_m: f64,
     /// Mass in kilograms.
     pub mass_kg: f64,
-    /// Coefficient of sliding friction.
-    pub friction: f64,
+    /// Coefficient of sliding friction in every contact, also with the finger pads. `None`: 0.6 on the table, and the
+    /// pads' own friction between the fingers, as for shipped parts.
+    pub friction: Option<f64>,
     /// The part's symmetry.
     pub symmetry: RotationalSymmetry,
 }
@@ -86,7 +89,7 @@ impl Extrusion<'_> {
         let ranges = [
             ("height in m", self.height_m, min_m, max_m),
             ("mass in kg", self.mass_kg, 1e-4, 3.0),
-            ("friction", self.friction, 0.01, 5.0),
+            ("friction", self.friction_or_assumed(), 0.01, 5.0),
             ("opening of the jaws in m", self.jaw_width_px * self.metres_per_pixel, 1e-3, LARGEST_JAW_WIDTH_M),
             ("longest side in m", self.longest_side_m(), 0.005, 0.4),
             ("marked line in m", self.grasp.length() * self.metres_per_pixel, 1e-3, 0.4),
@@ -99,6 +102,23 @@ impl Extrusion<'_> {
             }
         }
         Ok(())
+    }
+
+    fn friction_or_assumed(&self) -> f64 {
+        self.friction.unwrap_or(ASSUMED_FRICTION)
+    }
+
+    /// The attributes of a collision shape that determine its contacts.
+    fn contact_attributes(&self) -> String {
+        match self.friction {
+            // MuJoCo takes the parameters of a contact from the shape with the higher priority. Except for the
+            // friction, these are the parameters of the pads, which have priority 1.
+            Some(friction) => format!(
+                "priority=\"2\" friction=\"{friction} {} 0.0002\" solref=\"0.006 1\" solimp=\"0.95 0.99 0.001\"",
+                0.008 * friction
+            ),
+            None => format!("friction=\"{ASSUMED_FRICTION} 0.005 0.0002\""),
+        }
     }
 
     fn longest_side_m(&self) -> f64 {
@@ -141,7 +161,7 @@ impl ObjectSpec {
     pub fn extruded(extrusion: &Extrusion<'_>) -> Result<Self> {
         let fail = |reason: String| SimulationError::Asset { name: extrusion.name.to_owned(), reason };
         extrusion.check().map_err(fail)?;
-        let Extrusion { name, height_m, mass_kg, friction, symmetry, .. } = *extrusion;
+        let Extrusion { name, height_m, mass_kg, symmetry, .. } = *extrusion;
         let to_object = extrusion.to_object();
         let corners: Vec<Point2<f64>> = extrusion.outline.vertices.iter().map(&to_object).collect();
         let mark = |point: &Point2<f64>| {
@@ -157,7 +177,7 @@ impl ObjectSpec {
             title: name.to_owned(),
             description: format!("{name}, its outline in a photo drawn up to {:.1} mm", 1e3 * height_m),
             mass_kg,
-            friction,
+            friction: extrusion.friction_or_assumed(),
             grasp_start: mark(&extrusion.grasp.start),
             grasp_end: mark(&extrusion.grasp.end),
             jaw_width_m: extrusion.jaw_width_px * extrusion.metres_per_pixel,
@@ -211,7 +231,8 @@ fn boxes(corners: &[Point2<f64>]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
 
 /// Collision shapes and mass: the boxes of the strips, with uniform density.
 fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
-    let Extrusion { height_m, mass_kg, friction, .. } = *extrusion;
+    let Extrusion { height_m, mass_kg, .. } = *extrusion;
+    let contact = extrusion.contact_attributes();
     let boxes = boxes(corners);
     let area: f64 = boxes.iter().map(|(_, size)| size.x * size.y).sum();
     let shares: Vec<f64> = boxes.iter().map(|(_, size)| mass_kg * size.x * size.y / area).collect();
@@ -230,7 +251,7 @@ fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
         let _ = writeln!(
             geoms,
             "<geom name=\"object_collision_{idx}\" type=\"box\" pos=\"{:.6} {:.6} {half:.6}\" size=\"{:.6} {:.6} {half:.6}\" \
-             friction=\"{friction} 0.005 0.0002\" condim=\"4\" group=\"3\"/>",
+             {contact} condim=\"4\" group=\"3\"/>",
             at.x,
             at.y,
             0.5 * size.x,
@@ -281,7 +302,7 @@ mod tests {
             metres_per_pixel: 0.001,
             height_m,
             mass_kg: 0.05,
-            friction: 0.6,
+            friction: None,
             symmetry: RotationalSymmetry::None,
         }
     }
@@ -384,6 +405,7 @@ mod tests {
         assert!(refused(|e| e.jaw_width_px = 90.0).contains("opening of the jaws in m: expected 0.001 to 0.08"));
         assert!(refused(|e| e.metres_per_pixel = 0.01).contains("found 0.2"));
         assert!(refused(|e| e.mass_kg = f64::NAN).contains("mass in kg"));
+        assert!(refused(|e| e.friction = Some(6.0)).contains("friction: expected 0.01 to 5, found 6"));
         // 28 cm³.
         assert!(refused(|e| e.mass_kg = 0.17e-3).contains("density in kg/m³: expected 10 to 100000, found 6.07"));
     }

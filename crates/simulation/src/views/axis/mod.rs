@@ -5,9 +5,9 @@
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! An axis has [`PICTURES_PER_AXIS`] pictures. The range of the axis's parameter is divided into equal parts, the
-//! **strata**, and each picture has a random value of its own stratum, so that the pictures cover the range evenly. The
-//! same part, axis, number and seed give the same picture, bit for bit. All pictures are taken by the wrist camera on
+//! The range of the axis's parameter is divided into [`PICTURES_PER_AXIS`] equal parts, the **strata**, and each picture
+//! has a random value of its stratum ([`axis_stratum`]), so that the pictures cover the range evenly. The same part, axis,
+//! number, stratum and seed give the same picture, bit for bit. All pictures are taken by the wrist camera on
 //! the arm, as in an attempt.
 
 mod axis_name;
@@ -22,7 +22,7 @@ mod visible;
 use rand::Rng;
 
 pub use axis_name::Axis;
-pub use request::{AxisParameter, PICTURES_PER_AXIS};
+pub use request::{AxisParameter, PICTURES_PER_AXIS, axis_stratum};
 use request::{Drawn, Request};
 pub use visible::InstanceTruth;
 
@@ -52,13 +52,13 @@ pub struct AxisView {
     pub look_alike: Option<LookAlikeKind>,
 }
 
-/// Renders picture `number` of an axis.
+/// Renders picture `number` (of `of`) of an axis.
 ///
 /// # Errors
 /// As for [`Workcell::new`]; [`Configuration`](crate::SimulationError::Configuration) if no pose of the camera, the
 /// cover or the instances gives the picture that the axis requires.
-pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
-    let mut request = Request::new(spec, axis, number, seed);
+pub fn axis_view(spec: &ObjectSpec, axis: Axis, (number, of): (u64, u64), seed: u64) -> Result<AxisView> {
+    let mut request = Request::new(spec, axis, (number, of), seed);
     if axis == Axis::LookAlikes {
         return look_alike_view(&mut request);
     }
@@ -131,12 +131,26 @@ mod tests {
     fn strata_divide_the_range() {
         let spec = ObjectSpec::by_name("rod_end").unwrap();
         for number in 0..PICTURES_PER_AXIS {
-            let level = Request::new(&spec, Axis::Height, number, 3).level;
+            let level = Request::new(&spec, Axis::Height, (number, PICTURES_PER_AXIS), 3).level;
             assert_eq!((level * PICTURES_PER_AXIS as f64) as u64, number);
         }
-        assert_eq!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Height, 4, 3).level);
-        assert_ne!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Height, 4, 4).level);
-        assert_ne!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Tilt, 4, 3).level);
+        let level = |axis, seed| Request::new(&spec, axis, (4, PICTURES_PER_AXIS), seed).level;
+        assert_eq!(level(Axis::Height, 3), level(Axis::Height, 3));
+        assert_ne!(level(Axis::Height, 3), level(Axis::Height, 4));
+        assert_ne!(level(Axis::Height, 3), level(Axis::Tilt, 3));
+    }
+
+    #[test]
+    fn the_last_pictures_are_spread_over_the_strata() {
+        let strata = |of: u64| (0..of).map(|number| axis_stratum(number, of)).collect::<Vec<_>>();
+        assert_eq!(strata(1), [10]);
+        assert_eq!(strata(5), [2, 6, 10, 14, 18]);
+        assert_eq!(strata(40)[20..], strata(20));
+        assert_eq!((&strata(23)[..20], &strata(23)[20..]), (&strata(20)[..], &[3, 10, 16][..]));
+        assert_eq!(strata(19).last(), Some(&19));
+        // As in `strata_divide_the_range`, but in the fourth picture of five.
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        assert_eq!((Request::new(&spec, Axis::Height, (3, 5), 3).level * PICTURES_PER_AXIS as f64) as u64, 14);
     }
 
     #[test]
@@ -148,7 +162,7 @@ mod tests {
             ("cranfield_face", Axis::Height, 19),
         ] {
             let spec = ObjectSpec::by_name(name).unwrap();
-            let mut request = Request::new(&spec, axis, number, 5);
+            let mut request = Request::new(&spec, axis, (number, PICTURES_PER_AXIS), 5);
             let mut drawn = match axis {
                 Axis::Tilt => camera_pose::draw_tilted(&mut request, camera_pose::TILTS_DEG).unwrap(),
                 _ => camera_pose::draw_from_another_height(&mut request).unwrap(),
@@ -184,7 +198,7 @@ mod tests {
     fn covers_hide_what_their_stratum_says() {
         for (name, number) in [("fuel_line", 0), ("housing", 19)] {
             let spec = ObjectSpec::by_name(name).unwrap();
-            let shown = axis_view(&spec, Axis::Covered, number, 8).unwrap();
+            let shown = axis_view(&spec, Axis::Covered, (number, PICTURES_PER_AXIS), 8).unwrap();
             let stratum = |number: u64| 0.10 + 0.30 * number as f64 / PICTURES_PER_AXIS as f64;
             let covered = 1.0 - shown.truths[0].visible_share;
             // The covered fraction is within two percentage points of the wanted one.
@@ -199,7 +213,7 @@ mod tests {
     #[test]
     fn instances_keep_apart_and_things_in_clutter_do_not_cover() {
         let spec = ObjectSpec::by_name("rod_end").unwrap();
-        let shown = axis_view(&spec, Axis::Instances, 3, 8).unwrap();
+        let shown = axis_view(&spec, Axis::Instances, (3, PICTURES_PER_AXIS), 8).unwrap();
         assert_eq!(shown.truths.len(), 3);
         let outlines: Vec<_> =
             shown.scene.object.iter().chain(&shown.scene.instances).map(PlacedObject::footprint).collect();
@@ -209,7 +223,7 @@ mod tests {
                 assert!(footprint::separation(one, other) > 0.0);
             }
         }
-        let cluttered = axis_view(&spec, Axis::Clutter, 12, 8).unwrap();
+        let cluttered = axis_view(&spec, Axis::Clutter, (12, PICTURES_PER_AXIS), 8).unwrap();
         assert!((10..=15).contains(&cluttered.scene.distractors.len()));
         // Tall objects beside the part hide a small fraction of it from a camera that is not vertically above.
         assert!(cluttered.truths[0].visible_share > 0.85, "{}", cluttered.truths[0].visible_share);
@@ -218,9 +232,9 @@ mod tests {
     #[test]
     fn a_picture_is_the_same_to_the_bit_and_look_alikes_have_no_truth() {
         let spec = ObjectSpec::by_name("fuel_line").unwrap();
-        let [one, again] = [0; 2].map(|_| axis_view(&spec, Axis::Dark, 7, 2).unwrap());
+        let [one, again] = [0; 2].map(|_| axis_view(&spec, Axis::Dark, (7, PICTURES_PER_AXIS), 2).unwrap());
         assert_eq!(one.view, again.view);
-        let shown = axis_view(&spec, Axis::LookAlikes, 0, 2).unwrap();
+        let shown = axis_view(&spec, Axis::LookAlikes, (0, PICTURES_PER_AXIS), 2).unwrap();
         assert_eq!(shown.look_alike, Some(LookAlikeKind::Mirrored));
         assert!(shown.truths.is_empty() && shown.scene.object.unwrap().spec.name == "fuel_line_mirrored");
     }

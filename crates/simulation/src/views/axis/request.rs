@@ -12,8 +12,17 @@ use crate::scene::{SceneVariation, VariationConfig};
 use crate::views::seed::seed_of;
 use crate::workcell::Workcell;
 
-/// Number of pictures of an axis, which is the number of strata.
+/// Number of strata of an axis, and of pictures of a complete round: one for each stratum.
 pub const PICTURES_PER_AXIS: u64 = 20;
+
+/// The stratum of picture `number` of `of`. The pictures of a last, incomplete round are spread over the strata.
+pub fn axis_stratum(number: u64, of: u64) -> u64 {
+    let (in_round, num_last) = (number % PICTURES_PER_AXIS, of % PICTURES_PER_AXIS);
+    match num_last == 0 || number < of - num_last {
+        true => in_round,
+        false => (2 * in_round + 1) * PICTURES_PER_AXIS / (2 * num_last),
+    }
+}
 
 /// The amount of change of a picture along its axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,10 +48,10 @@ pub(super) struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
+    pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, (number, of): (u64, u64), seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed_of(spec.name.bytes(), number, seed) ^ ((axis as u64) << 56));
         let scene_seed = rng.random();
-        let stratum = (number % PICTURES_PER_AXIS) as f64;
+        let stratum = axis_stratum(number, of) as f64;
         let level = (stratum + rng.random_range(0.0..1.0)) / PICTURES_PER_AXIS as f64;
         Self { spec, number, scene_seed, level, rng }
     }
