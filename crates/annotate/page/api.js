@@ -118,6 +118,7 @@ export const api = {
   live: () => send("GET", "/api/live"),
   livePicture: (number) => send("GET", `/api/live/${number}/picture`, undefined, { isPicture: true }),
   detectLive: (number) => inTurn(() => send("POST", `/api/live/${number}/detect`)),
+  hold: (number) => send("POST", `/api/live/${number}/hold`),
   takePhoto: (number) => send("POST", `/api/live/${number}/photo`),
   keepFrame: (number) => send("POST", `/api/live/${number}/keep`),
   accept: (id, marks) => json("POST", `/api/trial-pictures/${id}/accept`, marks),

@@ -133,8 +133,11 @@ export async function takePhoto() {
 /** Pauses and continues; from another picture, returns to the camera. */
 export function toggleLive() {
   if (!state.camera || state.tab !== "try") return;
-  if (state.tryingLive) state.live.paused = !state.live.paused;
-  else {
+  if (state.tryingLive) {
+    state.live.paused = !state.live.paused;
+    // Otherwise another page's frames displace it; after a failure it can still be kept for a moment.
+    if (state.live.paused && state.live.number !== null) api.hold(state.live.number).catch(() => {});
+  } else {
     Object.assign(state, { tryingLive: true });
     state.live.paused = false;
     showCurrent();
