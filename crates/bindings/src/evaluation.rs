@@ -33,8 +33,8 @@ pub fn evaluate(
         let labelled =
             LabelledFolder::read(folder, &perception, label).map_err(Fault::of_kind_or(FaultKind::Teaching))?;
         sdg_files::prepare_folder(report)?;
-        let TestedFolder { tested, left_out, others, foreign_label } =
-            labelled.test(&perception, verification, min_score, &NoProgress)?;
+        let TestedFolder { tested, left_out, others, foreign_label, .. } =
+            labelled.test(&perception, verification, min_score, &|| false, &NoProgress)?;
         let evaluated = Evaluated {
             folder,
             // The model may not come from a file.
