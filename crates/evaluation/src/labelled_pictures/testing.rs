@@ -1,6 +1,6 @@
 //! Runs a model on all pictures of a folder.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow};
 use sdg_cell::{CellError, Perception};
 use sdg_grasp::{GraspError, Verification};
 
@@ -42,7 +42,7 @@ impl LabelledFolder {
         let Self { pictures, mut left_out, others, foreign_label } = self;
         progress.expect(pictures.len());
         let mut tested = Vec::with_capacity(pictures.len());
-        let mut was_interrupted = false;
+        let (mut was_interrupted, mut refusal) = (false, None);
         for picture in pictures {
             let name = picture.name();
             was_interrupted |= is_interrupted();
@@ -55,6 +55,7 @@ impl LabelledFolder {
                 // The model's region is for pictures of a different size.
                 Err(error) if matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::Region(_)))) => {
                     left_out.push(LeftOut { file: name, why: error.root_cause().to_string() });
+                    refusal = Some(error);
                     continue;
                 }
                 Err(error) => return Err(error),
@@ -63,8 +64,11 @@ impl LabelledFolder {
             progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
             tested.push(of_picture);
         }
-        if let (true, Some(LeftOut { file, why })) = (tested.is_empty(), left_out.last()) {
-            bail!("expected a picture to search, found {} files that are left out; {file}: {why}", left_out.len());
+        if tested.is_empty() {
+            return Err(match refusal {
+                Some(refusal) => refusal.context("no picture can be searched"),
+                None => anyhow!("interrupted before a picture was searched"),
+            });
         }
         Ok(TestedFolder { tested, left_out, others, foreign_label, is_interrupted: was_interrupted })
     }

@@ -41,9 +41,8 @@ impl Evaluation<'_> {
             ("seed", settings.seed.to_string()),
             ("preset", settings.preset.clone()),
             ("in parallel", format!("{} units of work", self.jobs)),
-            ("machine", machine()),
-            ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];
+        let facts: Vec<_> = facts.into_iter().chain(store.origin_facts()).collect();
         store.write_bytes("tables.md", markdown(&summaries, &facts, command).as_bytes())?;
         let of_group = |group: PartGroup| summaries.iter().find(|summary| summary.group == group);
         let [paper, held_out] = PartGroup::ALL.map(of_group);

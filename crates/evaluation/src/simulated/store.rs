@@ -28,6 +28,7 @@ use serde_json::Value;
 
 use super::settings::{Settings, difference};
 use crate::error::EvaluationError;
+use crate::machine::machine;
 
 /// Maximum size of a record.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
@@ -37,8 +38,24 @@ const MAX_RECORD_BYTES: u64 = 64 << 20;
 pub struct Store {
     folder: PathBuf,
     settings: Settings,
+    /// The process that made the folder; `None` if its version did not store it.
+    begun_by: Option<Origin>,
     /// Locked while the store exists.
     _lock: Lock,
+}
+
+/// Machine and program of a process.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Origin {
+    machine: String,
+    version: String,
+}
+
+impl Origin {
+    /// Those of this process.
+    fn this() -> Self {
+        Self { machine: machine(), version: format!("sdg {}", env!("CARGO_PKG_VERSION")) }
+    }
 }
 
 /// The contents of a file in the store.
@@ -74,13 +91,22 @@ impl Store {
         let Some(lock) = Lock::take(&folder.join(".lock"), access)? else {
             bail!("{}: another evaluation is running in this folder", folder.display());
         };
-        let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
+        let mut store =
+            Self { folder: folder.to_owned(), settings: settings.clone(), begun_by: Some(Origin::this()), _lock: lock };
         let teaching = settings.teaching();
-        match store.read_made_with::<()>("settings.json", &teaching)? {
-            Some(()) => {}
-            None => store.write_made_with("settings.json", &teaching, &())?,
+        match store.read_made_with("settings.json", &teaching)? {
+            Some(begun_by) => store.begun_by = begun_by,
+            None => store.write_made_with("settings.json", &teaching, &store.begun_by)?,
         }
         Ok(store)
+    }
+
+    /// Machine and version of this process for a page and, if they differ, those of the process that began the results.
+    pub(super) fn origin_facts(&self) -> Vec<(&'static str, String)> {
+        let this = Origin::this();
+        let other = self.begun_by.as_ref().filter(|begun_by| **begun_by != this);
+        let other = other.map(|Origin { machine, version }| ("results begun with", format!("{version} on {machine}")));
+        [("machine", this.machine), ("version", this.version)].into_iter().chain(other).collect()
     }
 
     pub fn folder(&self) -> &Path {
@@ -216,6 +242,25 @@ mod tests {
         fs::copy(elsewhere.path().join("cells/a.json"), folder.path().join("cells/a.json")).unwrap();
         let store = Store::open(folder.path(), &settings(1)).unwrap();
         assert!(one_line(&store.read::<u32>("cells/a.json").unwrap_err()).contains("seed: expected 1, found 3"));
+    }
+
+    #[test]
+    fn results_that_another_process_began_name_its_machine_and_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = || -> Vec<&str> {
+            let store = Store::open(folder.path(), &settings(1)).unwrap();
+            store.origin_facts().iter().map(|(name, _)| *name).collect()
+        };
+        assert_eq!([names(), names()], [["machine", "version"]; 2]);
+        let path = folder.path().join("settings.json");
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replace(&machine(), "2 cores, x86_64 linux")).unwrap();
+        assert_eq!(names(), ["machine", "version", "results begun with"]);
+        // A version that did not store them.
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        store.write_made_with("settings.json", &store.settings().teaching(), &()).unwrap();
+        drop(store);
+        assert_eq!(names(), ["machine", "version"]);
     }
 
     #[test]

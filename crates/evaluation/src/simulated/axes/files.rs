@@ -32,9 +32,8 @@ impl AxesSummary {
             ("preset", settings.preset.clone()),
             ("worker seconds", self.seconds.to_string()),
             ("in parallel", format!("{jobs} units of work")),
-            ("machine", machine()),
-            ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];
+        let facts: Vec<_> = facts.into_iter().chain(store.origin_facts()).collect();
         let other = other.map(|folder| folder.display().to_string()).unwrap_or_default();
         let more = || difference_tables(comparisons, &other);
         store.write_bytes("axes.md", markdown(self, more(), &facts, command).as_bytes())?;

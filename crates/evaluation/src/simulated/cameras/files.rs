@@ -23,9 +23,8 @@ impl CamerasSummary {
             ("preset", settings.preset.clone()),
             ("worker seconds for pictures", format!("{:.0}", self.seconds)),
             ("in parallel", format!("{jobs} units of work")),
-            ("machine", machine()),
-            ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ];
+        let facts: Vec<_> = facts.into_iter().chain(store.origin_facts()).collect();
         store.write_bytes("cameras.md", markdown(self, &facts, command).as_bytes())?;
         let json = json!({ "summary": self, "machine": machine(), "command": command });
         store.write_bytes("cameras.json", format!("{json:#}\n").as_bytes())?;

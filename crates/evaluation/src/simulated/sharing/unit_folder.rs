@@ -91,7 +91,7 @@ impl UnitFolder {
         for path in self.entries()? {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             if name.starts_with("done-") {
-                state.receipts.extend(read_passing_record(&path)?);
+                state.receipts.extend(read_passing_record::<Receipt>(&path)?);
             } else if name.starts_with("failed-") {
                 state.failures.push(read_record(&path)?);
             } else if name == RUNNING {

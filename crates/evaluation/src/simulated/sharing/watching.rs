@@ -93,7 +93,7 @@ impl Watch {
     pub fn progress(&mut self) -> Result<Progress> {
         let plan = UnitList::read_all(&self.folder)?;
         let (mut running, mut failed, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
-        let mut interrupted = Vec::new();
+        let mut interrupted: Vec<InterruptedUnit> = Vec::new();
         for unit in &plan.units {
             if self.done.get(&unit.name).is_some_and(|(_, num_files)| *num_files == unit.files.len()) {
                 continue;
