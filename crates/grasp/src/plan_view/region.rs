@@ -61,12 +61,29 @@ impl RegionInPlanView {
     }
 }
 
-#[cfg(all(test, feature = "teach"))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drawn_part;
+    use crate::taught_marks::TaughtMarks;
+    use image::{Rgb, RgbImage};
     use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-    use sdg_geometry::PinholeCamera;
+    use sdg_geometry::{GraspLine, PinholeCamera};
+
+    /// A bar of 80 × 30 pixels.
+    fn bar() -> TaughtDemonstration {
+        let is_bar = |x: u32, y: u32| (20..100).contains(&x) && (20..50).contains(&y);
+        let cutout = RgbImage::from_fn(120, 70, |x, y| Rgb([if is_bar(x, y) { 220 } else { 60 }; 3]));
+        let marks = TaughtMarks {
+            label: "bar".to_owned(),
+            bbox: BoundingBox { x1: 20.0, y1: 20.0, x2: 100.0, y2: 50.0 },
+            grasp: GraspLine::new(Point2::new(40.0, 35.0), Point2::new(80.0, 35.0)),
+            outline: None,
+            width_px: 30.0,
+            photo_size: None,
+            photo_middle: None,
+        };
+        TaughtDemonstration::from_parts(cutout, marks).unwrap()
+    }
 
     #[test]
     fn a_region_that_is_too_small_is_compared_with_the_part_in_the_picture() {
@@ -78,7 +95,7 @@ mod tests {
         // 1000 pixels per metre in the picture, 2000 in the plan view.
         let view = PlanView::of(&camera, 0.0, 2000.0, None, 6_000_000).unwrap();
         let size = [view.width, view.height];
-        let taught = [TaughtDemonstration::new(&drawn_part::demonstration([320, 240])).unwrap()];
+        let taught = [bar()];
         let region = RegionInPlanView::new(&SearchRegion::new([300, 200, 15, 10]), &camera, &view).unwrap();
         let lengths = |window: Result<SearchWindow>| match window.unwrap_err() {
             GraspError::Region(RegionError::SmallerThanPart { length, across, .. }) => [length, across],

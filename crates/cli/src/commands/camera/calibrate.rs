@@ -42,6 +42,7 @@ pub struct CalibrateArgs {
 /// Calibrates the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
+    args.pictures.iter().for_each(|path| sdg_files::keep(path));
     CameraUpdate::check(&args.out)?;
     let config = |(width, height)| CalibrationConfig { width, height, has_k3: args.k3 };
     let mut lines: Vec<Value> = Vec::new();
