@@ -32,6 +32,8 @@ pub(crate) struct Folder {
     num_played: u64,
     next_at: Instant,
     frame: PixelFrame,
+    /// Length of the next file, which could not be decoded yet, and the time since which its length has been constant.
+    unchanged: Option<(u64, Instant)>,
 }
 
 enum Place {
@@ -77,6 +79,7 @@ impl Folder {
             num_played: 0,
             next_at: Instant::now(),
             frame: PixelFrame::Upright,
+            unchanged: None,
         }
     }
 
@@ -105,6 +108,7 @@ impl Folder {
 
     fn mark_played(&mut self, path: &Path) {
         self.num_played += 1;
+        self.unchanged = None;
         if let (Place::Folder(_), Some(name)) = (&self.place, path.file_name()) {
             self.played.insert(name.to_owned());
         }
@@ -126,7 +130,7 @@ impl Source for Folder {
             }
         };
         self.next_at = Instant::now() + self.playback.interval.unwrap_or_default();
-        let read = read_finished(&path, self.frame, deadline);
+        let read = read_finished(&path, self.frame, deadline, &mut self.unchanged);
         if !matches!(read, Err(Missing::Late)) {
             self.mark_played(&path);
         }
@@ -159,11 +163,16 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
 }
 
 /// Reads a picture and its modification time. A file that cannot be decoded is read again while it may still grow; one
-/// that grows is not read before the deadline, and is late if it is not complete then.
-fn read_finished(path: &Path, frame: PixelFrame, deadline: Instant) -> Result<(image::RgbImage, SystemTime), Missing> {
+/// that grows is not read before the deadline. A file that may still grow at the deadline is late; `unchanged` is kept
+/// for the next call.
+fn read_finished(
+    path: &Path,
+    frame: PixelFrame,
+    deadline: Instant,
+    unchanged: &mut Option<(u64, Instant)>,
+) -> Result<(image::RgbImage, SystemTime), Missing> {
     let torn = |found: String| Missing::Torn(format!("{}: {found}", path.display()));
     let failed = |error: std::io::Error| torn(error.to_string());
-    let mut unchanged: Option<(u64, Instant)> = None;
     loop {
         let file = File::open(path).map_err(failed)?;
         let metadata = file.metadata().map_err(failed)?;
@@ -176,18 +185,19 @@ fn read_finished(path: &Path, frame: PixelFrame, deadline: Instant) -> Result<(i
                 Ok(picture) => return Ok((picture, changed.unwrap_or_else(|_| SystemTime::now()))),
                 Err(found) => found,
             };
-            if is_growing {
-                return Err(Missing::Late);
-            }
             // A file that was modified long ago is complete.
             let age = changed.ok().and_then(|changed| changed.elapsed().ok());
             let is_old = age.is_some_and(|age| age > UNCHANGED_TIME * 4);
-            if is_old || unchanged.is_some_and(|(_, since)| since.elapsed() >= UNCHANGED_TIME) {
+            let is_constant = unchanged.is_some_and(|(_, since)| since.elapsed() >= UNCHANGED_TIME);
+            if !is_growing && (is_old || is_constant) {
                 return Err(torn(found));
             }
         }
         if is_growing || unchanged.is_none() {
-            unchanged = Some((length, Instant::now()));
+            *unchanged = Some((length, Instant::now()));
+        }
+        if Instant::now() >= deadline {
+            return Err(Missing::Late);
         }
         sleep(POLL_INTERVAL);
     }
@@ -219,7 +229,8 @@ mod tests {
     }
 
     fn level(folder: &mut Folder) -> Option<u8> {
-        folder.take(soon()).unwrap().map(|taken| taken.picture.get_pixel(0, 0)[0])
+        let later = Instant::now() + Duration::from_secs(2);
+        folder.take(later).unwrap().map(|taken| taken.picture.get_pixel(0, 0)[0])
     }
 
     #[test]
@@ -264,7 +275,10 @@ mod tests {
         write(&files, "a.png", &png(1)[..40]);
         write(&files, "b.png", &png(2));
         let mut folder = open(&files, Playback::default());
-        assert!(matches!(folder.take(soon()), Err(Missing::Torn(found)) if found.contains("a.png")));
+        // Until its length has been constant for long enough, it may still grow.
+        assert!(matches!(folder.take(soon()), Err(Missing::Late)));
+        let torn = std::iter::repeat_with(|| folder.take(soon())).find(|taken| !matches!(taken, Err(Missing::Late)));
+        assert!(matches!(torn, Some(Err(Missing::Torn(found))) if found.contains("a.png")));
         assert_eq!(level(&mut folder), Some(2));
     }
 

@@ -301,6 +301,20 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
     stdout(&["camera", "table", &files.path("given.png"), "--out", &out, "--focal-px", "1000"]);
     let written = fs::read_to_string(&out).unwrap();
     assert!(written.ends_with(kept) && written.contains("1000.0"), "{written}");
+    // The pose on the hand was measured with the old focal length.
+    let pose = "{translation_m: [0.05, 0.0, 0.06], rotation_xyzw: [0.0, 0.0, 0.0, 1.0]}";
+    fs::write(&out, format!("{written}hand_eye:\n  flange_from_camera: {pose}\n")).unwrap();
+    let given = files.path("given.png");
+    let again: [&str; 7] = ["camera", "table", &given, "--out", &out, "--focal-px", "1000"];
+    let output = sdg(&again);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && told.contains("pose on the hand was measured with the old estimate"), "{told}");
+    assert!(!fs::read_to_string(&out).unwrap().contains("hand_eye"));
+    // A comment in another encoding is not changed.
+    let latin = [written.as_bytes(), &b"# K\xfcche\n"[..]].concat();
+    fs::write(&out, &latin).unwrap();
+    assert_refused(&again, 2, &["--out: ", "phone.yaml: expected YAML, found bytes that are not text"]);
+    assert_eq!(fs::read(&out).unwrap(), latin);
 }
 
 /// `poses.yaml` of a camera on the hand, and its pictures. With the inverse poses, in `beside.yaml`, the same result

@@ -120,7 +120,10 @@ pub fn mounted(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> R
 }
 
 /// The text of a camera file.
-pub(crate) fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
+///
+/// # Errors
+/// The bytes are not UTF-8.
+pub fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
     String::from_utf8(bytes).map_err(|_| anyhow!("{}: expected YAML, found bytes that are not text", path.display()))
 }
 

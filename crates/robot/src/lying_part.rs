@@ -112,6 +112,13 @@ impl LyingParts {
         self.0.retain(|part| !part.is_at(base_from_part));
     }
 
+    /// Sets the height of the grasp of the part known at a place to that of `base_from_part`.
+    pub(crate) fn set_height(&mut self, base_from_part: &Isometry3<f64>) {
+        for part in self.0.iter_mut().filter(|part| part.is_at(base_from_part)) {
+            part.base_from_part.translation.z = base_from_part.translation.z;
+        }
+    }
+
     /// All known parts.
     pub(crate) fn all(&self) -> &[LyingPart] {
         &self.0

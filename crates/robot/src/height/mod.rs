@@ -79,3 +79,10 @@ pub struct HeightReport {
     /// The part in the pictures, in the order of the pictures.
     pub sightings: Vec<Sighting>,
 }
+
+impl HeightReport {
+    /// Whether the grasp uses the measured height.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.settled.is_some_and(|settled| settled.source == HeightSource::Measured)
+    }
+}

@@ -271,7 +271,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         };
         self.check_target(&target)?;
         is_wanted(self, &target)?;
-        self.take(&target)
+        self.take(&target, self.surface_height_m())
     }
 
     /// Fails if the hand holds an object: the sequence opens the hand in the air, and the object would fall.
@@ -290,11 +290,12 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Ok(self.robot.set_load(Load::NONE)?)
     }
 
-    /// Moves above a found part, grasps it, lifts it and holds it.
-    fn take(&mut self, target: &GraspTarget) -> Steps<()> {
+    /// Moves above a found part, grasps it, lifts it and holds it. `support_m` is z of the surface under the part, from
+    /// which the obstacle with this surface is recognised, m.
+    fn take(&mut self, target: &GraspTarget, support_m: f64) -> Steps<()> {
         self.known.lying.take(&target.base_from_tcp);
         let p = target.base_from_tcp.translation;
-        self.known.support = Some(Point3::new(p.x, p.y, self.surface_height_m()));
+        self.known.support = Some(Point3::new(p.x, p.y, support_m));
         let approach = self.go_above(target)?;
         self.descend(approach)?;
         self.close(target)?;

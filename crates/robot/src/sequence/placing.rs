@@ -22,6 +22,7 @@ use crate::arm_state::{HandCommand, Load};
 use crate::camera_pose::CameraPose;
 use crate::error::Result;
 use crate::grasp_target::GraspTarget;
+use crate::height::HeightReport;
 use crate::lying_part::{LyingPart, LyingParts};
 use crate::perception::{GraspStep, PartFinder, StepObserver};
 use crate::place::{Place, PlaceGoal, PlaceOffset};
@@ -128,17 +129,25 @@ pub fn grasp_and_place<A: CompliantArm>(
     let mut sequence = Sequence::yielding(robot, finder, observer, camera, config);
     let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
-    let (mut errors, mut last) = (Vec::new(), None);
-    let outcome = match &grasp.outcome {
-        GraspOutcome::Failed { step, why } => PlacingOutcome::Failed { step: *step, why: why.clone() },
-        GraspOutcome::Held => match sequence.place(goal, placing, &mut errors, &mut last) {
-            Ok(()) => PlacingOutcome::Placed,
-            Err(Stop::Failed(step, why)) => PlacingOutcome::Failed { step, why },
-            Err(Stop::Error(error)) => return Err(error),
-        },
+    let mut report = PlacingReport::of(grasp);
+    let placed = match report.grasp.outcome.clone() {
+        GraspOutcome::Failed { step, why } => Err(Stop::Failed(step, why)),
+        GraspOutcome::Held => sequence.place(goal, placing, &mut report),
     };
-    let touched = std::mem::take(&mut sequence.report.touched);
-    Ok(PlacingReport { grasp, outcome, touched, errors, last })
+    match placed {
+        Ok(()) => {}
+        Err(Stop::Failed(step, why)) => report.outcome = PlacingOutcome::Failed { step, why },
+        Err(Stop::Error(error)) => return Err(error),
+    }
+    report.touched = std::mem::take(&mut sequence.report.touched);
+    Ok(report)
+}
+
+impl PlacingReport {
+    /// The report after the first grasp, before a step failed.
+    fn of(grasp: GraspReport) -> Self {
+        Self { grasp, outcome: PlacingOutcome::Placed, touched: Vec::new(), errors: Vec::new(), last: None }
+    }
 }
 
 impl PlacingOutcome {
@@ -176,18 +185,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Fills the last two fields of the report, `errors` and `last`.
-    fn place(
-        &mut self,
-        goal: &PlaceGoal,
-        placing: &PlacingConfig,
-        errors: &mut Vec<PlaceOffset>,
-        last: &mut Option<PlaceOffset>,
-    ) -> Steps<()> {
+    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, report: &mut PlacingReport) -> Steps<()> {
+        let is_height_measured = report.grasp.height.as_ref().is_some_and(HeightReport::is_measured);
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
             let raised_m = self.put_down(&aim, goal, placing)?;
-            let base_from_placed = above(&aim.base_from_part, raised_m);
+            // The contact measures the difference between the place and the surface under the first grasp. If that
+            // surface was not measured, its height may be the wrong one, and the place's may be right.
+            let place_raised_m = if is_height_measured { raised_m } else { 0.0 };
+            let base_from_placed = above(&aim.base_from_part, place_raised_m);
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.geometry().forward(&q);
             let shape = self.known.held.as_ref().and_then(|held| held.shape.clone());
@@ -202,8 +209,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 (None, None) => return Err(fails("the part is not seen where it was put down".to_owned())),
             };
             let error = beside(&aim.base_from_part, &found.base_from_tcp, placing.symmetry);
-            errors.push(error);
-            *last = Some(error);
+            report.errors.push(error);
+            report.last = Some(error);
             if let Some(outside_m) = outside_bin_m(goal, &found) {
                 return match outside_m > 0.0 {
                     true => Err(fails(format!("the part lies beside the bin, {} from its centre", told(&error)))),
@@ -226,26 +233,35 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
-            *last = None;
+            report.last = None;
             self.known.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // The hand keeps the orientation in which it released the part, because the fingers had room in that
             // orientation.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
-            // The place's height is given or measured by the contact, and the part's height above its surface was known
-            // before the first grasp.
-            target.base_from_tcp.translation.z = base_from_placed.translation.z;
+            // The hand grasps the part at the height of its release. The neighbouring parts lie as high as this one; the
+            // next placement again expects all of them at the given height.
+            target.base_from_tcp.translation.z = aim.base_from_part.translation.z + raised_m;
             self.known.surface_m = Some(goal.surface_m + raised_m);
+            self.set_neighbours_height(goal, &target.base_from_tcp);
             // Other parts may lie next to the part: the hand opens no wider than for releasing.
             self.known.opening_margin_m = placing.release_margin_m;
-            self.take(&target)?;
+            self.take(&target, goal.surface_m)?;
+            self.set_neighbours_height(goal, &aim.base_from_part);
         }
     }
 
-    /// Descends compliantly until contact with the place; returns the height of the place above the given one, m. It is
-    /// 0 in a bin, where the part may lie on others, and if the contact is no farther from the expected one than the
-    /// finger tips remain from a surface: a part may be tilted in the hand.
+    /// Sets the height of the parts known or assumed in the neighbouring cells to that of a part.
+    fn set_neighbours_height(&mut self, goal: &PlaceGoal, base_from_part: &Isometry3<f64>) {
+        for neighbour in goal.neighbours_in_base(base_from_part.translation.z) {
+            self.known.lying.set_height(&neighbour);
+        }
+    }
+
+    /// Descends compliantly until contact with the place; returns the height of the contact above the expected one, m.
+    /// It is 0 in a bin, where the part may lie on others, and if the contact is no farther from the expected one than
+    /// the finger tips remain from a surface: a part may be tilted in the hand.
     fn put_down(&mut self, aim: &Aim, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<f64> {
         let touch_down = TouchDown { max_way_m: aim.soft_m + BELOW_M, ..placing.touch_down };
         let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {

@@ -71,7 +71,7 @@ pub struct TableArgs {
     /// Focal length in pixels, for a camera without a file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// The file to write, with `table:`; default: the camera file. Without --camera, an existing file is replaced only
+    /// The file to write, with `table:`; default: the camera file. Without --camera, an existing file is updated only
     /// if its camera was estimated
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -122,6 +122,12 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
     sdg_files::extend(out, args.camera.as_deref(), text.as_bytes())?;
+    if estimate.is_some_and(|(old, _)| old.flange_from_camera.is_some()) {
+        eprintln!(
+            "{}: the camera's pose on the hand was measured with the old estimate and is removed: run hand-eye again",
+            out.display()
+        );
+    }
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
 }
@@ -133,7 +139,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
 /// The file contains something else: one that cannot be read may be that of a camera with another lens model.
 fn estimate_in(out: &Path) -> Result<Option<(CalibratedCamera, String)>> {
     let bytes = std::fs::read(out).unwrap_or_default();
-    let text = String::from_utf8_lossy(&bytes).into_owned();
+    let text = camera_files::text_of(out, bytes).map_err(|error| Usage(format!("--out: {error}")))?;
     if text.trim().is_empty() {
         return Ok(None);
     }

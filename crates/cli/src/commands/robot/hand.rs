@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use sdg_kinematics::HAND_OPENING_MAX_M;
-use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load};
+use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load, Watch};
 
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
@@ -78,15 +78,21 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Moves the fingers; Ctrl-C stops them.
 fn command(arm: &mut FrankaArm, command: HandCommand, states: &Path) -> Result<HandState> {
+    move_fingers(states, |watch| {
+        arm.start_hand(command)?;
+        arm.finish_hand(watch)
+    })
+}
+
+/// Moves the fingers; Ctrl-C stops them. Writes the arm's last second of states after an error.
+pub(super) fn move_fingers<T>(states: &Path, motion: impl FnOnce(&mut Watch) -> sdg_robot::Result<T>) -> Result<T> {
     let mut watch = robots::watch(&Interrupt::watch());
-    arm.start_hand(command)?;
-    let finished = arm.finish_hand(&mut watch);
-    if finished.is_err() {
+    let moved = motion(&mut watch);
+    if moved.is_err() {
         write_states(states, &watch);
     }
-    Ok(finished?)
+    Ok(moved?)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use sdg_robot::{
 };
 
 use super::arm_args::ArmArgs;
+use super::hand::move_fingers;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, Consent, check_states, confirm, write_states};
@@ -47,12 +48,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         check_states(&args.states)?;
         let (mut arm, address) = args.arm.connect()?;
         if confirm(&format!("Move the fingers of the hand at {address}?"), args.yes)? == Consent::Given {
-            let mut watch = robots::watch(&Interrupt::watch());
-            let homed = arm.home_hand(&mut watch);
-            if homed.is_err() {
-                write_states(&args.states, &watch);
-            }
-            homed?;
+            move_fingers(&args.states, |watch| arm.home_hand(watch))?;
             // The hand no longer holds an object.
             arm.set_load(Load::NONE)?;
         }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandState, MotionEnd};
 use crate::error::RobotError;
+use crate::height::{HeightSource, SettledHeight};
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::PlaceKind;
@@ -419,17 +420,27 @@ impl PartFinder<Cell> for SearchedAt {
 }
 
 #[test]
-fn a_part_is_searched_at_the_measured_height_of_its_place() {
+fn a_part_is_searched_at_the_height_of_the_contact_if_its_height_was_measured() {
     let camera = CameraPose::InBase(Isometry3::identity());
     let goal = Place { surface_m: 0.03, ..tray() }.goal(1).unwrap();
     let (config, placing) = (config(), PlacingConfig::default());
-    // A contact within 2 mm of the expected one counts as that.
-    for (lower_m, expected_m) in [(0.001, 0.05), (0.006, 0.044)] {
+    // A contact within 2 mm of the expected one counts as that. A lower one may also be caused by a part that lay on a
+    // higher surface than assumed, unless the height was measured there.
+    for (lower_m, source, expected_m) in [
+        (0.001, HeightSource::Measured, 0.05),
+        (0.006, HeightSource::Measured, 0.044),
+        (0.006, HeightSource::Told, 0.05),
+    ] {
         let mut cell = Cell { lower_m, ..cell(Isometry3::identity()) };
         let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
-        let mut finder = SearchedAt(f64::NAN);
-        grasp_and_place(&mut robot, &mut finder, &mut (), camera, &config, &goal, &placing).unwrap();
-        assert!((finder.0 - expected_m).abs() < 1e-4, "{}", finder.0);
+        let (mut finder, mut begun) = (SearchedAt(f64::NAN), Begun(Vec::new()));
+        let mut sequence = Sequence::yielding(&mut robot, &mut finder, &mut begun, camera, &config);
+        let outcome = sequence.grasp(|_, _| Ok(())).unwrap();
+        let settled = SettledHeight { height_m: 0.02, sigma_m: 0.001, source };
+        let height = Some(HeightReport { settled: Some(settled), ..HeightReport::default() });
+        let mut report = PlacingReport::of(GraspReport { height, ..sequence.grasp_report(outcome) });
+        assert!(sequence.place(&goal, &placing, &mut report).is_ok(), "{report:?}");
+        assert!((finder.0 - expected_m).abs() < 1e-4, "{source:?}: {}", finder.0);
     }
 }
 
@@ -447,24 +458,41 @@ fn a_part_that_touches_an_object_above_its_place_is_kept() {
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
 }
 
-#[test]
-fn a_low_part_is_put_onto_an_obstacle_and_taken_from_it() {
-    let shelf = Obstacle {
+/// An obstacle 30 mm high under the first cell of the tray.
+fn shelf() -> Obstacle {
+    Obstacle {
         name: "shelf".to_owned(),
         shape: Shape::Box { half_m: [0.1, 0.1, 0.015] },
         base_from_obstacle: Isometry3::translation(0.4, -0.3, 0.015),
-    };
+    }
+}
+
+#[test]
+fn a_low_part_is_put_onto_an_obstacle_and_taken_from_it() {
     let place =
         |at_m: [f64; 2], surface_m: f64| Place { at_m, surface_m, kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
     let mut cell = cell(Isometry3::identity());
     cell.base_from_part.translation.z = 0.008;
-    let onto = GraspConfig { obstacles: vec![shelf], ..config() };
+    let onto = GraspConfig { obstacles: vec![shelf()], ..config() };
     let report = run(&mut cell, &onto, &place([0.4, -0.3], 0.03), &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert!((cell.base_from_part.translation.z - 0.038).abs() < 1e-4, "{}", cell.base_from_part);
     let from = GraspConfig { surface_m: Some(0.03), ..onto };
     let report = run(&mut cell, &from, &place([0.5, 0.1], 0.0), &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
+}
+
+#[test]
+fn a_low_part_that_slides_is_taken_again_from_an_obstacle_of_another_height() {
+    let goal = Place { surface_m: 0.03, kind: PlaceKind::Pose, ..tray() }.goal(1).unwrap();
+    let onto = GraspConfig { obstacles: vec![shelf()], ..config() };
+    for lower_m in [0.005, -0.005] {
+        let mut cell = Cell { lower_m, ..cell(planar(0.005, 0.001, 0.08)) };
+        cell.base_from_part.translation.z = 0.008;
+        let report = run(&mut cell, &onto, &goal, &PlacingConfig::default());
+        assert_eq!((&report.outcome, report.errors.len()), (&PlacingOutcome::Placed, 2), "{report:?}");
+        assert!((cell.base_from_part.translation.z - (0.038 - lower_m)).abs() < 1e-4, "{}", cell.base_from_part);
+    }
 }
 
 #[test]
@@ -628,6 +656,11 @@ fn the_hand_leaves_a_tray_that_is_lower_than_its_file_says() {
     let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
     assert_eq!(report.outcome, PlacingOutcome::Placed, "{report:?}");
     assert!((cell.base_from_part.translation.z - 0.025).abs() < 1e-4, "{}", cell.base_from_part);
+    // If the part slides, the second grasp is at the height of the contact, and so are the neighbouring parts.
+    let mut cell = Cell { lower_m: 0.005, ..super::tests::cell(planar(0.003, 0.001, 0.02)) };
+    cell.base_from_part.translation.z = 0.03;
+    let report = run(&mut cell, &known, &tray().goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!((&report.outcome, report.errors.len()), (&PlacingOutcome::Placed, 2), "{report:?}");
 }
 
 #[test]
