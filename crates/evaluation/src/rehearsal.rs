@@ -231,8 +231,8 @@ impl Rehearsal<'_> {
         Ok(rehearsed)
     }
 
-    /// Rejects places that leave no room for the part's start, and a place whose cells have too little room for the part
-    /// or for the opening fingers.
+    /// Rejects places that leave no room for the part's start, and a place whose cells have too little room for the
+    /// part or for the opening fingers.
     ///
     /// # Errors
     /// There is no free start; or a cell is too small: the error names the first one and a sufficient pitch.
