@@ -9,7 +9,7 @@ use sdg_cell::Perception;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle, sample_size,
 };
-use sdg_grasp::{GraspModel, TurnedGrasp, Verification, turned_grasps, without_unmarked_parts};
+use sdg_grasp::{GraspDetection, GraspModel, TurnedGrasp, Verification, turned_grasps, without_unmarked_parts};
 use serde_json::{Value, json};
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Errors, Instance, LabelledPicture, Tested, Totals, Truth, judge};
@@ -59,6 +59,14 @@ impl HeldBackSamples {
     /// The sample with this index.
     pub fn sample(&self, number: u64) -> Sample {
         self.augmenter.held_out(FIRST + number)
+    }
+
+    /// The detections of a model without a region in a sample, with the sizes of parts in the whole photo.
+    ///
+    /// # Errors
+    /// Detection fails.
+    pub fn detect(&self, model: &GraspModel, sample: &Sample) -> Result<Vec<GraspDetection>> {
+        Ok(model.detect_in_middle(&sample.image, self.whole, Verification::ByShape)?)
     }
 }
 
@@ -134,7 +142,7 @@ impl HeldBackFigures {
         let photo_px = samples.photo_px;
         let judged = (0..COUNT).into_par_iter().map(|number| {
             let sample = samples.sample(number);
-            let detections = model.detect_in_middle(&sample.image, samples.whole, Verification::ByShape)?;
+            let detections = samples.detect(model, &sample)?;
             let of_label = |labelled: LabelledInstance| {
                 let LabelledInstance { annotation, optional, .. } = labelled;
                 Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }

@@ -7,7 +7,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2};
 use sdg_cell::{CameraPose, ModelFinder, MountedCamera, footprints_on_table, part_shape};
@@ -231,17 +231,39 @@ impl Rehearsal<'_> {
         Ok(rehearsed)
     }
 
-    /// Rejects a place whose cells have too little room for the part or for the opening fingers.
+    /// Rejects places that leave no room for the part's start, and a place whose cells have too little room for the
+    /// part or for the opening fingers.
     ///
     /// # Errors
-    /// A cell is too small; the error names the first one and a sufficient pitch.
+    /// There is no free start; or a cell is too small: the error names the first one and a sufficient pitch.
     pub fn check_room(&self) -> Result<()> {
+        self.check_starts()?;
         let Some(part) = part_shape(&self.told_model(1)?) else { return Ok(()) };
         // The simulator's arm.
         let hand = ArmGeometry::panda().hand;
         for number in 1..=self.attempts as usize {
             if let Some((goal, placing)) = self.placing(number)? {
                 goal.check_room(&part, placing.symmetry, placing.release_margin_m, &hand)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Rejects places and obstacles that leave no room for the part's start: the part would lie in a place, where it is
+    /// not grasped.
+    fn check_starts(&self) -> Result<()> {
+        let Some(place) = &self.place else { return Ok(()) };
+        // Without the light and the table, which do not change the part's pose.
+        let variation = VariationConfig { appearance: false, ..place.variation() };
+        for number in 1..=self.attempts as usize {
+            let scene = SceneVariation::sample(Some(self.object), &variation, attempt_seed(self.seed, number));
+            if scene.object.is_some_and(|object| !variation.has_room_for(&object)) {
+                let [x, y] = [&variation.object_x_m, &variation.object_y_m]
+                    .map(|range| format!("{:.0} to {:.0}", 1e3 * range.start, 1e3 * range.end));
+                bail!(
+                    "the places and obstacles leave no room for the part: expected a free start at x from {x} mm and y \
+                     from {y} mm, found none for attempt {number}"
+                );
             }
         }
         Ok(())
@@ -489,6 +511,20 @@ mod tests {
         };
         assert!((0..50).any(|seed| is_placed(&VariationConfig::default(), seed)));
         assert!((0..50).all(|seed| !is_placed(&place.variation(), seed)));
+    }
+
+    #[test]
+    fn places_that_cover_all_starts_are_refused() {
+        let (model, object) = (taught(), ObjectSpec::by_name("pendulum").unwrap());
+        let checked = |size_mm: [u32; 2]| {
+            let bin = format!("\n[[bin]]\nname = \"bin\"\nat_mm = [500, 0]\nsize_mm = {size_mm:?}\n");
+            let text = include_str!("../../../datasets/workcell/workcell.toml").to_owned() + &bin;
+            let place = RehearsedPlace::named("bin", WorkcellFile::from_toml(&text).unwrap()).unwrap();
+            Rehearsal { place: Some(place), ..rehearsal(&model, &object) }.check_starts()
+        };
+        assert!(checked([100, 100]).is_ok());
+        let refused = checked([500, 700]).unwrap_err().to_string();
+        assert!(refused.contains("at x from 370 to 620 mm and y from -200 to 200 mm"), "{refused}");
     }
 
     #[test]

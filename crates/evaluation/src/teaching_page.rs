@@ -6,7 +6,7 @@ use sdg_cell::drawing;
 use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
 use sdg_geometry::PlanarGrasp;
 use sdg_grasp::{
-    GraspModel, HIT_DEGREES, HIT_PX, History, LossValues, Taught, TaughtDemonstration, ValidationRecord, Verification,
+    GraspModel, HIT_DEGREES, HIT_PX, History, LossValues, Taught, TaughtDemonstration, ValidationRecord,
     without_unmarked_parts,
 };
 use sdg_report::{
@@ -111,7 +111,7 @@ impl TeachingPage<'_> {
         let mut figures = Vec::new();
         for number in 0..TRIED {
             let sample = samples.sample(number);
-            let detections = model.detect(&sample.image, Verification::ByShape)?;
+            let detections = samples.detect(&model, &sample)?;
             let best = detections.iter().map(|detection| detection.score).fold(0.0, f64::max);
             let there = if sample.objects.is_empty() { "without the part" } else { "with the part" };
             let figure = Figure::photo(drawing::with_detections(&sample.image, &detections));

@@ -52,7 +52,7 @@ pub use keypoint::{GraspLine, Keypoint, Visibility};
 pub use mask::{Mask, RunLengthMask};
 pub use mount::Mount;
 pub use nalgebra;
-pub use outline::outer_outline;
+pub use outline::{outer_boundary, outer_outline};
 pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;

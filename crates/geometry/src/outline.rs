@@ -19,7 +19,7 @@ const MIN_TOLERANCE_PX: f64 = 0.35;
 /// # Units and frames
 /// Pixels; the centre of the first pixel is (0.5, 0.5). The points run clockwise (y points down).
 pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
-    let traced = largest_boundary(mask)?;
+    let Polygon { vertices: traced } = outer_boundary(mask)?;
     let mut tolerance = MIN_TOLERANCE_PX;
     loop {
         let vertices = simplify_ring(&traced, tolerance);
@@ -30,9 +30,11 @@ pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
     }
 }
 
-/// Follows the pixels' edges with the mask on the right-hand side, once around each boundary; the boundary of the
-/// largest area is the outer outline of the largest piece.
-fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
+/// As [`outer_outline`], but not simplified: the pixels of the mask inside it are exactly those of the piece and of its
+/// holes.
+// Follows the pixels' edges with the mask on the right-hand side, once around each boundary; the boundary of the
+// largest area is the outer outline of the largest piece.
+pub fn outer_boundary(mask: &Mask) -> Option<Polygon> {
     let (width, height) = (mask.width() as i64, mask.height() as i64);
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width && y < height && mask.get(x as u32, y as u32);
     // An upper edge has a pixel of the mask below it and none above; each boundary has at least one upper edge.
@@ -78,7 +80,7 @@ fn largest_boundary(mask: &Mask) -> Option<Vec<Point2<f64>>> {
             }
         }
     }
-    best.map(|(_, corners)| corners).filter(|corners| corners.len() >= 12)
+    best.map(|(_, corners)| Polygon { vertices: corners }).filter(|boundary| boundary.vertices.len() >= 12)
 }
 
 /// Positive for a ring that runs clockwise with y down; holes run in the opposite direction.
@@ -150,6 +152,15 @@ mod tests {
         let filled = outline.rasterize(60, 40);
         let alone = Mask::from_fn(60, 40, |x, y| (10..50).contains(&x) && (5..25).contains(&y));
         assert!(filled.iou(&alone) > 0.99, "{}", filled.iou(&alone));
+    }
+
+    #[test]
+    fn the_boundary_encloses_the_largest_piece_and_its_holes() {
+        // A rectangle without one corner, where another piece touches it diagonally.
+        let piece = |x: u32, y: u32| (3..12).contains(&x) && (2..9).contains(&y) && (x, y) != (11, 8);
+        let mask = Mask::from_fn(20, 15, |x, y| (piece(x, y) && (x, y) != (6, 5)) || (x, y) == (11, 9) || x > 16);
+        let filled = outer_boundary(&mask).unwrap().rasterize(20, 15);
+        assert_eq!(filled, Mask::from_fn(20, 15, piece));
     }
 
     #[test]

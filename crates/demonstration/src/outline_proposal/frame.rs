@@ -2,7 +2,7 @@
 
 use image::{RgbImage, imageops};
 use nalgebra::Point2;
-use sdg_geometry::{BoundingBox, Mask, Polygon};
+use sdg_geometry::{BoundingBox, Mask, Polygon, outer_boundary};
 
 use super::color_mixture::ColorMixture;
 use super::lab::Lab;
@@ -125,7 +125,17 @@ impl Frame {
 
     /// The candidates inside an outline in the photo.
     pub fn pixels_of(&self, outline: &Polygon) -> Vec<bool> {
-        let outline = Polygon { vertices: outline.vertices.iter().map(|v| self.place_of(v)).collect() };
+        self.pixels_in(&Polygon { vertices: outline.vertices.iter().map(|v| self.place_of(v)).collect() })
+    }
+
+    /// The largest piece of the marked candidates, without its holes.
+    pub fn largest_piece(&self, marked: &[bool]) -> Vec<bool> {
+        let boundary = outer_boundary(&self.mask(marked));
+        boundary.map_or_else(|| vec![false; marked.len()], |boundary| self.pixels_in(&boundary))
+    }
+
+    /// The candidates inside an outline in pixels of the frame.
+    fn pixels_in(&self, outline: &Polygon) -> Vec<bool> {
         let mask = outline.rasterize(self.width as u32, self.height() as u32);
         let is_inside = |at: usize| mask.get((at % self.width) as u32, (at / self.width) as u32);
         self.candidates.iter().enumerate().map(|(at, &candidate)| candidate && is_inside(at)).collect()

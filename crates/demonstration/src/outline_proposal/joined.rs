@@ -15,15 +15,17 @@ use super::strokes::grown;
 
 /// The changed area is extended by this many pixels of the frame, because the outline runs beside the changed pixels.
 const MARGIN_STEPS: usize = 2;
+/// Minimum fraction of the changed pixels that the joined outline assigns as the corrected one does. Chosen by hand.
+const MIN_CHANGED_SHARE: f64 = 0.9;
 /// Minimum IoU of the joined outline with the corrected one: a lower value means that the outlines were joined at wrong
 /// places. Chosen by hand.
 const MIN_IOU: f64 = 0.95;
 
-/// Joins the outlines, given the changed pixels of the frame; `None` if no vertex of the known outline is left, or if
-/// the outlines cannot be joined.
+/// Joins the outlines, given the changed pixels of the frame; `None` if no vertex of the known outline is left, if the
+/// outlines cannot be joined, or if the result crosses itself.
 pub(crate) fn joined(frame: &Frame, known: &Polygon, corrected: &Polygon, changed: &[bool]) -> Option<Polygon> {
     if !changed.contains(&true) {
-        return Some(known.clone());
+        return Polygon::new(known.vertices.clone()).ok().filter(|known| !known.crosses_itself());
     }
     let area = grown(changed, frame.width, MARGIN_STEPS);
     let is_changed = |point: &Point2<f64>| frame.pixel_of(point).is_some_and(|at| area[at]);
@@ -54,9 +56,14 @@ pub(crate) fn joined(frame: &Frame, known: &Polygon, corrected: &Polygon, change
     }
     // The ring ends at its start.
     vertices.pop();
-    let joined = Polygon { vertices };
-    let [own, expected] = [&joined, corrected].map(|outline| frame.mask(&frame.pixels_of(outline)));
-    (!joined.crosses_itself() && own.iou(&expected) >= MIN_IOU).then_some(joined)
+    let joined = Polygon::new(vertices).ok()?;
+    let [own, expected] = [&joined, corrected].map(|outline| frame.pixels_of(outline));
+    let at_changed = |at: &usize| changed[*at];
+    let num_changed = (0..changed.len()).filter(at_changed).count();
+    let num_alike = (0..changed.len()).filter(at_changed).filter(|&at| own[at] == expected[at]).count();
+    let is_alike = num_alike as f64 >= MIN_CHANGED_SHARE * num_changed as f64
+        && frame.mask(&own).iou(&frame.mask(&expected)) >= MIN_IOU;
+    (is_alike && !joined.crosses_itself()).then_some(joined)
 }
 
 fn is_clockwise(outline: &Polygon) -> bool {

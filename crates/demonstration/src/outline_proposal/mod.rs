@@ -62,11 +62,11 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, strokes: &[Out
 }
 
 /// Corrects an existing outline by strokes in drawing order: areas far from all strokes stay as they are. Where the
-/// outline lies beyond the box, the box is extended.
+/// outline lies beyond the box, the box is extended; beyond the photo, the outline is clipped.
 ///
 /// Where something was changed, the result is like that of [`propose_outline`]: in the box, in steps of the reduced
-/// photo. Elsewhere the outline keeps its vertices, if both can be joined. If nothing is left, the result is the box
-/// itself.
+/// photo. Elsewhere the outline keeps its vertices, if both can be joined and do not cross. If nothing is left, the
+/// result is the box itself.
 pub fn correct_outline(image: &RgbImage, bbox: &BoundingBox, outline: &Polygon, strokes: &[OutlineStroke]) -> Polygon {
     outline_in(image, bbox, Some(outline), strokes)
 }
@@ -76,6 +76,8 @@ fn outline_in(image: &RgbImage, bbox: &BoundingBox, known: Option<&Polygon>, str
     let [width, height] = [image.width(), image.height()].map(f64::from);
     let inside = bbox.clip(width, height);
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
+    let known = known.map(|known| known.clip(width, height));
+    let known = known.as_ref();
     let with_box = |known: &Polygon| BoundingBox::around(known.vertices.iter().copied().chain(bbox.corners()));
     let searched = known.and_then(with_box).map_or(inside, |bounds| bounds.clip(width, height));
     let Some(frame) = Frame::cut_out(image, &searched, MAX_PIXELS) else { return nothing_found() };
@@ -87,7 +89,9 @@ fn outline_in(image: &RgbImage, bbox: &BoundingBox, known: Option<&Polygon>, str
         return nothing_found();
     }
     let Some(known) = known else { return outline };
-    let changed: Vec<bool> = frame.pixels_of(known).iter().zip(&in_part).map(|(was, is)| was != is).collect();
+    // As in the traced outline: without pieces that a stroke cut off, and without holes that it closed.
+    let [was, is] = [&frame.pixels_of(known), &in_part].map(|marked| frame.largest_piece(marked));
+    let changed: Vec<bool> = was.iter().zip(&is).map(|(was, is)| was != is).collect();
     joined(&frame, known, &outline, &changed).unwrap_or(outline)
 }
 
@@ -203,6 +207,64 @@ mod tests {
         let corrected = correct_outline(&image, &bbox, &known, &[stroke]);
         assert!(corrected.contains(&Point2::new(55.0, 100.0)) && corrected.contains(&Point2::new(100.0, 145.0)));
         assert!((corrected.area() / known.area() - 1.0).abs() < 0.02, "{corrected:?}");
+    }
+
+    /// The outline corrected by one stroke. Its vertices at the lower left must stay.
+    fn corrected_by(
+        (image, bbox): (&RgbImage, &BoundingBox),
+        known: &Polygon,
+        line: [[f64; 2]; 2],
+        is_inside: bool,
+    ) -> Polygon {
+        let stroke = OutlineStroke { points: line.map(Point2::from).to_vec(), is_inside };
+        let corrected = correct_outline(image, bbox, known, &[stroke]);
+        for vertex in known.vertices.iter().filter(|vertex| vertex.x < 140.0 && vertex.y > 130.0) {
+            assert!(corrected.vertices.contains(vertex), "{vertex} of {corrected:?}");
+        }
+        corrected
+    }
+
+    #[test]
+    fn a_stroke_across_a_cable_cuts_off_its_end() {
+        let (mut image, bbox) = disc(300, 50.0);
+        for (x, y) in (195..280).flat_map(|x| (148..153).map(move |y| (x, y))) {
+            image.put_pixel(x, y, Rgb([170, 60, 50]));
+        }
+        let bbox = BoundingBox { x2: 286.0, ..bbox };
+        let mut known = arc(150.0, 50.0, 1..72);
+        known.vertices.extend([[200.0, 148.0], [280.0, 148.0], [280.0, 153.0], [200.0, 153.0]].map(Point2::from));
+        let corrected = corrected_by((&image, &bbox), &known, [[240.0, 140.0], [240.0, 160.0]], false);
+        assert!(corrected.contains(&Point2::new(150.0, 150.0)));
+        for x in [240.5, 270.5] {
+            assert!(!corrected.contains(&Point2::new(x, 150.5)), "{corrected:?}");
+        }
+    }
+
+    #[test]
+    fn a_stroke_across_a_slot_closes_all_of_it() {
+        let (image, bbox) = disc(300, 50.0);
+        let mut known = arc(150.0, 50.0, -17..54);
+        known.vertices.extend([[147.0, 100.1], [147.0, 150.0], [153.0, 150.0], [153.0, 100.1]].map(Point2::from));
+        let corrected = corrected_by((&image, &bbox), &known, [[147.5, 110.0], [152.5, 110.0]], true);
+        for y in [110.5, 140.5] {
+            assert!(!known.contains(&Point2::new(150.0, y)));
+            assert!(corrected.contains(&Point2::new(150.0, y)), "{corrected:?}");
+        }
+    }
+
+    #[test]
+    fn a_known_outline_is_clipped_to_the_photo_and_does_not_cross_itself() {
+        let (image, bbox) = disc(200, 50.0);
+        let polygon = |vertices: [[f64; 2]; 4]| Polygon { vertices: vertices.map(Point2::from).to_vec() };
+        let far = polygon([[60.0, 60.0], [1e10, 60.0], [140.0, 140.0], [60.0, 140.0]]);
+        let stroke = OutlineStroke::click(Point2::new(55.0, 100.0), true);
+        for strokes in [&[] as &[OutlineStroke], &[stroke]] {
+            // Rounding at 1e10 is about 1e-6.
+            let bounds = correct_outline(&image, &bbox, &far, strokes).bounds();
+            assert!(bounds.x1 >= 0.0 && bounds.y1 >= 0.0 && bounds.x2 <= 200.001 && bounds.y2 <= 200.0, "{bounds:?}");
+        }
+        let bow_tie = polygon([[60.0, 60.0], [140.0, 140.0], [140.0, 60.0], [60.0, 140.0]]);
+        assert!(!correct_outline(&image, &bbox, &bow_tie, &[]).crosses_itself());
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! A folder of labelled pictures: assigns label files to pictures, and reads their contents.
 //!
 //! LabelMe has a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes
-//! COCO beside the picture; if a.json is another tool's file, it writes a.coco.json, which then replaces a.json. A file
-//! with the labels of one picture belongs to the picture with the file's name, even if another picture is named in the
-//! file, because people rename files. Every other label file belongs to the pictures that it names.
+//! COCO beside the picture; if a.json is another tool's file, it writes a.coco.json, which then replaces a.json.
+//! Changes of a.png in a common file labels.json are in labels.a.png.coco.json, which replaces labels.json for a.png. A
+//! file with the labels of one picture belongs to the picture with the file's name, even if another picture is named in
+//! the file, because people rename files. Every other label file belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -153,19 +154,21 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         for picture in labelled {
             let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) else { continue };
             let first_path = &assigned.label_files[first].0;
-            // Paths are sorted, so a.coco.json is before a.json.
-            let is_ours = *first_path == picture.with_extension("coco.json");
-            if !is_ours || *path != picture.with_extension("json") {
+            let (used, used_path, other) = if *first_path == changes_of(&picture, path) {
+                (first, first_path, path)
+            } else if *path == changes_of(&picture, first_path) {
+                (label_file_idx, path, first_path)
+            } else {
                 bail!(
                     "{}: expected one label file, found two: {} and {}",
                     picture.display(),
                     file_name(first_path),
                     file_name(path)
                 );
-            }
-            let why = format!("{} is used for {}", file_name(first_path), file_name(&picture));
-            left_out.push(LeftOut { file: file_name(path), why });
-            assigned.pictures.insert(picture, first);
+            };
+            let why = format!("{} is used for {}", file_name(used_path), file_name(&picture));
+            left_out.push(LeftOut { file: file_name(other), why });
+            assigned.pictures.insert(picture, used);
         }
     }
     if assigned.pictures.is_empty() {
@@ -180,6 +183,16 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         left_out.push(LeftOut { file: file_name(picture), why: "no label file names it".to_owned() });
     }
     Ok(assigned)
+}
+
+/// The file into which `sdg annotate` writes changes of a picture's labels if `labels` is another tool's file, as in
+/// crates/annotate/src/annotation_file.rs.
+fn changes_of(picture: &Path, labels: &Path) -> PathBuf {
+    if labels.file_stem() == picture.file_stem() {
+        labels.with_extension("coco.json")
+    } else {
+        labels.with_extension(format!("{}.coco.json", file_name(picture)))
+    }
 }
 
 /// The pictures that a label file labels.
@@ -308,9 +321,40 @@ fn chosen_label(
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use sdg_geometry::{BoundingBox, GraspLine};
+    use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn changes_of_one_picture_replace_a_common_file_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let write = |file: &str, pictures: &[&str]| {
+            let images: Vec<_> = pictures.iter().map(|name| json!({"id": name.len(), "file_name": name})).collect();
+            fs::write(at(file), json!({"images": images, "annotations": []}).to_string()).unwrap();
+        };
+        // One file for changes is before the common file in order, the other one after it.
+        let pictures = ["a.png", "photo.png", "z.jpeg"];
+        pictures.iter().for_each(|name| fs::write(at(name), "").unwrap());
+        write("labels.json", &pictures);
+        for changed in ["a.png", "z.jpeg"] {
+            write(&format!("labels.{changed}.coco.json"), &[changed]);
+        }
+        let mut left_out = Vec::new();
+        let assigned = assign(folder.path(), &mut left_out).unwrap();
+        let used = |name: &str| file_name(&assigned.label_files[assigned.pictures[&at(name)]].0);
+        assert_eq!(pictures.map(used), ["labels.a.png.coco.json", "labels.json", "labels.z.jpeg.coco.json"]);
+        let told: Vec<_> = left_out.iter().map(|left_out| (left_out.file.as_str(), left_out.why.as_str())).collect();
+        let expected = |name: &str| format!("labels.{name}.coco.json is used for {name}");
+        assert_eq!(told, [("labels.json", &*expected("a.png")), ("labels.json", &*expected("z.jpeg"))]);
+        // Another second file is an error.
+        write("more.json", &["photo.png"]);
+        let refused = assign(folder.path(), &mut left_out).err().unwrap().to_string();
+        assert!(refused.contains("expected one label file, found two: labels.json and more.json"), "{refused}");
+    }
 
     #[test]
     fn the_taught_instance_is_optional_even_if_its_label_marks_another_grasp() {

@@ -46,6 +46,17 @@ impl Preset {
         }
     }
 
+    /// Checks that networks can be taught with the weights in this build, without reading these weights.
+    ///
+    /// # Errors
+    /// [`GraspError::NeedsBaseWeights`] if the preset starts from weights and this build contains none for it.
+    pub fn check_shipped_start(self) -> Result<()> {
+        if self.needs_base_weights() || (self == Self::Edge && !cfg!(feature = "base-weights")) {
+            return Err(GraspError::NeedsBaseWeights { preset: self.name() });
+        }
+        Ok(())
+    }
+
     /// Whether the preset's frozen stages require imported weights.
     pub(super) fn needs_base_weights(self) -> bool {
         match self {

@@ -117,6 +117,14 @@ fn assert_same_after_a_file(model: &GraspModel) {
 }
 
 #[test]
+fn a_missing_start_is_known_without_reading_it() {
+    for preset in Preset::ALL {
+        let options = TeachOptions { preset, ..TeachOptions::new(1) };
+        assert_eq!(preset.check_shipped_start().is_ok(), options.with_start_read().is_ok(), "{preset:?}");
+    }
+}
+
+#[test]
 fn every_network_model_detects_the_same_after_a_file() {
     for kind in [ModelKind::A, ModelKind::B, ModelKind::C, ModelKind::D] {
         let model = taught(Preset::Edge, kind);

@@ -61,6 +61,15 @@ impl Default for VariationConfig {
     }
 }
 
+impl VariationConfig {
+    /// Whether the object is at the minimum distance from the taken areas. A sampled one is not if they leave no room
+    /// for it.
+    pub fn has_room_for(&self, object: &PlacedObject) -> bool {
+        let outline = object.footprint();
+        self.taken.iter().all(|area| footprint::separation(&outline, area) >= self.clearance_m)
+    }
+}
+
 /// A part with its pose on the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedObject {
@@ -217,13 +226,9 @@ fn sample_object(spec: &ObjectSpec, config: &VariationConfig, rng: &mut Pcg64Mcg
         let yaw = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
         PlacedObject { spec: spec.clone(), base_from_object: spec.base_from_object(x, y, yaw) }
     };
-    let is_apart = |object: &PlacedObject| {
-        let outline = object.footprint();
-        config.taken.iter().all(|area| footprint::separation(&outline, area) >= config.clearance_m)
-    };
     let mut object = draw();
     for _ in 1..OBJECT_TRIES {
-        if is_apart(&object) {
+        if config.has_room_for(&object) {
             break;
         }
         object = draw();

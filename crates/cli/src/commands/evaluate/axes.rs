@@ -27,8 +27,8 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     }
     let models = models(&args.models, &ModelKind::ALL)?;
     if selection.axes.is_empty() && !GRASPING_MODELS.iter().any(|model| models.contains(model)) {
-        let letters = |models: &[ModelKind]| models.iter().map(|model| model.letter()).collect::<Vec<_>>().join(" or ");
-        let (grasping, found) = (letters(&GRASPING_MODELS), letters(&models));
+        let letters = |models: &[ModelKind]| models.iter().map(|model| model.letter()).collect::<Vec<_>>();
+        let (grasping, found) = (letters(&GRASPING_MODELS).join(" or "), letters(&models).join(", "));
         return Err(Usage(format!("--models: expected {grasping} for the grasps of --axes, found {found}")).into());
     }
     let objects = objects(&args.objects, ObjectSpec::names())?;

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use sdg_evaluation::Settings;
-use sdg_grasp::{GraspError, ModelKind, Preset, TeachOptions};
+use sdg_grasp::{GraspError, ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
 use super::args::EvaluateArgs;
@@ -16,11 +16,10 @@ use crate::parts::part_named;
 pub fn settings(args: &EvaluateArgs, models: &[ModelKind]) -> Result<(Preset, Settings)> {
     let wrong = |error: GraspError| Usage(format!("--preset: {error}"));
     let preset: Preset = args.preset.parse().map_err(wrong)?;
-    if let Some(&kind) = models.iter().find(|model| model.has_network()) {
-        let mut options = TeachOptions::new(args.seed);
-        (options.kind, options.preset) = (kind, preset);
+    let is_teaching = !args.sharing.list_units && !args.sharing.collect;
+    if is_teaching && models.iter().any(|model| model.has_network()) {
         // Otherwise, models that were never taught would count as models that find nothing.
-        options.with_start_read().map_err(wrong)?;
+        preset.check_shipped_start().map_err(wrong)?;
     }
     let settings = Settings {
         protocol: Settings::PROTOCOL,

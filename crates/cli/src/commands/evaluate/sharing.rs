@@ -205,7 +205,8 @@ fn watch(folder: &Path, json: bool) -> Result<Outcome> {
             let submit_again = match progress.interrupted.is_empty() {
                 true => "",
                 false => {
-                    "; submit the interrupted ones again with the same --submit, or watch again if Slurm requeued them"
+                    "; submit the interrupted ones again, with a longer --limit-mins if they reached the limit, or \
+                     watch again if Slurm requeued them"
                 }
             };
             return match progress.units - progress.done {

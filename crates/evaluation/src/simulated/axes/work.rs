@@ -176,8 +176,8 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
     }
 }
 
-/// Renders picture `number` (of `of`) of an axis. If a scene has no room for camera, cover or instances, another scene for the same
-/// stratum of the axis is tried.
+/// Renders picture `number` (of `of`) of an axis. If a scene has no room for camera, cover or instances, another scene
+/// for the same stratum of the axis is tried.
 pub(crate) fn draw(object: &ObjectSpec, axis: Axis, (number, of): (u64, u64), seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {

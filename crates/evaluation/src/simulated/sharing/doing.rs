@@ -59,18 +59,28 @@ impl Evaluation<'_> {
         let (settings, models) = (self.settings_of(unit)?, self.models_of(unit)?);
         let state = folder.read()?;
         let earlier = state.receipts.into_iter().next();
+        let (by, started) = (Worker::this(), Instant::now());
         if let Some(receipt) = &earlier {
-            if let Some(difference) = difference(&settings, &receipt.settings)? {
-                return Err(EvaluationError::UnitOfOtherSettings { unit: name.clone(), difference }.into());
-            }
-            if let Some(model) = other_model(&state.models, &models) {
-                bail!("{name}: {}", made_with_another(model, name));
-            }
-            if receipt.covers(&unit.files) {
-                return Ok(Ended::Already(Box::new(receipt.clone())));
+            let other_settings = difference(&settings, &receipt.settings)?
+                .map(|difference| EvaluationError::UnitOfOtherSettings { unit: name.clone(), difference }.into());
+            let of_other_model = || {
+                let model = other_model(&state.models, &models)?;
+                Some(anyhow!("{name}: {}", made_with_another(model, name)))
+            };
+            let refused: Option<anyhow::Error> = other_settings.or_else(of_other_model);
+            match (refused, receipt.covers(&unit.files)) {
+                (None, true) => return Ok(Ended::Already(Box::new(receipt.clone()))),
+                (None, false) => {}
+                (Some(error), true) => return Err(error),
+                (Some(error), false) => {
+                    // Without a record, --watch would wait for the unit.
+                    let started_secs = folder.begin(&by)?.started_secs;
+                    let why = one_line(&error);
+                    folder.fail(&Failure { unit: name.clone(), by, started_secs, seconds: 0.0, why })?;
+                    return Err(error);
+                }
             }
         }
-        let (by, started) = (Worker::this(), Instant::now());
         let running = folder.begin(&by)?;
         let started_secs = running.started_secs;
         let ended = self.check_after(unit).and_then(|()| {
@@ -253,10 +263,16 @@ mod tests {
 
         // C is taught again.
         store.write_bytes("models/C-pendulum.sdg", b"a model").unwrap();
-        let expected = "look-pendulum: done with another models/C-pendulum.sdg, which was taught again since";
+        let expected = "look-pendulum: done with an earlier models/C-pendulum.sdg; this model was taught again";
         let refused = look(&store, &objects, &both).unwrap_err().to_string();
         assert!(refused.starts_with(expected) && refused.ends_with("remove units/look-pendulum and do it again"));
-        assert!(told(&both).unwrap().starts_with("look-pendulum: stale: done with another models/C-pendulum.sdg"));
+        assert!(told(&both).unwrap().starts_with("look-pendulum: stale: done with an earlier models/C-pendulum.sdg"));
         assert_eq!(told(&[ModelKind::S]), None);
+        // For further models, the unit is not done: the refusal is recorded, so that --watch does not wait for it.
+        let unit = UnitFolder::of(folder.path(), LOOK);
+        assert!(unit.read().unwrap().failures.is_empty());
+        assert!(look(&store, &objects, &[ModelKind::S, ModelKind::C, ModelKind::D]).is_err());
+        let state = unit.read().unwrap();
+        assert!(state.running.is_none() && state.failures[0].why.starts_with(expected), "{:?}", state.failures);
     }
 }

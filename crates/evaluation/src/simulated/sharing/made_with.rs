@@ -29,5 +29,5 @@ pub(super) fn other_model<'m>(made_with: &ModelHashes, now: &'m ModelHashes) -> 
 
 /// Why a unit's results cannot be used any more.
 pub(super) fn made_with_another(model: &str, unit: &str) -> String {
-    format!("done with another {model}, which was taught again since; remove units/{unit} and do it again")
+    format!("done with an earlier {model}; this model was taught again: remove units/{unit} and do it again")
 }

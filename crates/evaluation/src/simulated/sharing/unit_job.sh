@@ -14,13 +14,15 @@ trap 'is_ended=yes' TERM
 @COMMAND@ --out "$folder" --unit "$unit" && exit 0
 status=$?
 # A unit that failed for the first time is tried once more, on another node if there is one. A killed process leaves its running.json,
-# which counts as a failure, as in --watch. The number of restarts is limited, because a program that cannot begin leaves no record.
+# which counts as a failure, as in --watch. A unit with a result (of fewer models) is tried again only after a recorded failure. The
+# number of restarts is limited, because a program that cannot begin leaves no record.
 # The task is requeued, so that arrays that depend on this one keep waiting. Slurm sends SIGTERM to requeued tasks, and also to tasks
 # that are cancelled or reach their time limit; these are not requeued here. (Status 143: the signal came before sdg handled it.)
 shopt -s nullglob
 results=("$folder/units/$unit"/done-*.json)
 tries=("$folder/units/$unit"/failed-*.json "$folder/units/$unit"/running.jso[n])
-if [ -z "$is_ended" ] && [ "$status" -ne 143 ] && [ "${#results[@]}" -eq 0 ] && [ "${#tries[@]}" -le 1 ] &&
+if [ -z "$is_ended" ] && [ "$status" -ne 143 ] && [ "${#tries[@]}" -le 1 ] &&
+    { [ "${#results[@]}" -eq 0 ] || [ "${#tries[@]}" -eq 1 ]; } &&
     [ "${SLURM_RESTART_COUNT:-0}" -le "${#tries[@]}" ] && scontrol --version >/dev/null 2>&1; then
     trap '' TERM
     nodes=$(sinfo --noheader --Node --format %N --partition "${SLURM_JOB_PARTITION:-}" | sort -u | wc -l)

@@ -1,14 +1,14 @@
 //! Pictures that are harder than an ordinary scene in one property: the axes along which models are evaluated.
 //!
 //! ```text
-//! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, ground truth, amount of change
+//! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, truth, amount of change
 //!                               SceneVariation::sample    camera, things, image
 //! ```
 //!
-//! The range of the axis's parameter is divided into [`PICTURES_PER_AXIS`] equal parts, the **strata**, and each picture
-//! has a random value of its stratum ([`axis_stratum`]), so that the pictures cover the range evenly. The same part, axis,
-//! number, stratum and seed give the same picture, bit for bit. All pictures are taken by the wrist camera on
-//! the arm, as in an attempt.
+//! The range of the axis's parameter is divided into [`PICTURES_PER_AXIS`] equal parts, the **strata**, and each
+//! picture has a random value of its stratum ([`axis_stratum`]), so that the pictures cover the range evenly. The same
+//! part, axis, number, stratum and seed give the same picture, bit for bit. All pictures are taken by the wrist camera
+//! on the arm, as in an attempt.
 
 mod axis_name;
 mod camera_pose;
