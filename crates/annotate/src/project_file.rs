@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
-use crate::names::{PROJECT_FILE, relative};
+use crate::names::{PROJECT_FILE, file_name, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::region::Searched;
 
@@ -93,6 +93,14 @@ pub fn names_in_project(photo: &Path) -> Result<Vec<String>> {
     let ProjectFile { mut photos, tried, .. } = ProjectFile::read(&place)?.unwrap_or_default();
     photos.extend(tried.into_iter().map(|tried| tried.file));
     Ok(photos)
+}
+
+/// The versions of the models of all projects in a folder whose files can be read.
+pub fn versions_in(folder: &Path) -> Vec<Version> {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let files = files.filter(|file| file_name(file).ends_with(PROJECT_FILE));
+    let place = |file| ProjectPlace { folder: folder.to_owned(), file, is_folder: false };
+    files.filter_map(|file| ProjectFile::read(&place(file)).ok().flatten()).flat_map(|project| project.models).collect()
 }
 
 /// The name of the part in the project of a folder or photo, if it has one.

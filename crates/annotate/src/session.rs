@@ -64,6 +64,17 @@ fn model_file(home: &Path, label: &str) -> PathBuf {
     home.with_file_name(format!("{}.sdg", safe_stem(label)))
 }
 
+/// The given file of the model in use, or [`model_file`], with a number if another project uses that.
+///
+/// # Errors
+/// A file of that name cannot be read.
+fn model_path(given: Option<&Path>, home: &Path, state: &State) -> Result<PathBuf> {
+    match given {
+        Some(path) => Ok(path.to_owned()),
+        None => state.models.own_path(&model_file(home, &state.label)),
+    }
+}
+
 /// The name of a part without surrounding spaces.
 ///
 /// # Errors
