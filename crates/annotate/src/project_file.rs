@@ -163,6 +163,8 @@ pub struct Tried {
 pub struct Gone {
     pub photos: Vec<String>,
     pub tried: Vec<Tried>,
+    /// The photos that the project's file named, also those that are there. The first one is the reference.
+    pub order: Vec<String>,
     /// A sentence for the user about each picture that is left out: these, and unreadable ones that were added to the
     /// folder; and one about those beyond the maximum number.
     pub notes: Vec<String>,
@@ -261,9 +263,10 @@ impl ProjectFile {
         let mut file = read.unwrap_or_default();
         let folder = &place.folder;
         let is_there = |name: &String| folder.join(name).is_file();
+        let order = file.photos.clone();
         let (photos, gone_photos) = file.photos.drain(..).partition(is_there);
         let (tried, gone_tried) = file.tried.drain(..).partition(|tried: &Tried| is_there(&tried.file));
-        let mut gone = Gone { photos: gone_photos, tried: gone_tried, notes: Vec::new() };
+        let mut gone = Gone { photos: gone_photos, tried: gone_tried, order, notes: Vec::new() };
         let names = gone.photos.iter().chain(gone.tried.iter().map(|tried| &tried.file));
         gone.notes = names.map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         (file.photos, file.tried) = (photos, tried);
@@ -280,11 +283,15 @@ impl ProjectFile {
         Ok((file, gone))
     }
 
-    /// Appends the names of the missing files, so that the project still contains them.
+    /// Adds the names of the missing files, so that the project still contains them: photos at their earlier places.
     pub fn keep_missing(&mut self, gone: &Gone) {
-        let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
-        let photos: Vec<String> = photos.cloned().collect();
-        self.photos.extend(photos);
+        let place = |name: &String| gone.order.iter().position(|known| known == name).unwrap_or(usize::MAX);
+        for name in &gone.photos {
+            if !self.photos.contains(name) {
+                let next = self.photos.iter().position(|other| place(other) > place(name));
+                self.photos.insert(next.unwrap_or(self.photos.len()), name.clone());
+            }
+        }
         let is_new = |tried: &&Tried| self.tried.iter().all(|known| known.file != tried.file);
         let tried: Vec<Tried> = gone.tried.iter().filter(is_new).cloned().collect();
         self.tried.extend(tried);
