@@ -1,6 +1,6 @@
 // Requests to the server. Errors are one line of text for the user.
 
-/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. `image`: the server's view of a photo whose marks another program has changed. */
+/** A failed request; `message` can be shown to the user. `lost`: the server does not answer, or was restarted. `isPassing`: the same request may succeed later. `image`: the server's view of a photo whose marks another program has changed. */
 export class RequestError extends Error {
   constructor(message, lost = false) {
     super(message);
@@ -61,7 +61,7 @@ async function send(method, path, body, options = {}) {
   } catch {
     // Refusals by the guard are plain text.
   }
-  throw Object.assign(new RequestError(message), { image });
+  throw Object.assign(new RequestError(message), { image, isPassing: /409|5../.test(response.status) });
 }
 
 /** One detection at a time: each uses all cores. A comparison, which can take minutes, does not delay the live picture. */

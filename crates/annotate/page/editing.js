@@ -20,17 +20,22 @@ export const adopt = (view) => ({ ...view, ...fieldsOf(view.marks), past: [], re
 
 const isBeingChanged = (target) => JSON.stringify(target.marks) !== target.committed;
 
-/** Replaces marks by those of another page or program, as an undoable step. */
-function replace(target, { marks, advice, saved, note }) {
+/** Replaces marks by those of another page or program, as an undoable step; a note says why if the user's were not saved. */
+function replace(target, { marks, advice, saved, note }, why) {
+  if (why) toast(`${target.name}: ${why}. “Undo” restores it.`);
   target.past.push([target.committed, target.found]);
   Object.assign(target, { advice, saved, note, ...fieldsOf(marks), revision: target.revision + 1 });
   if (target === image()) Object.assign(state, { draft: null, vertex: null });
 }
 
-/** Adopts marks that another page has changed. Marks that are being changed here stay. */
-export function adoptChange(target, view) {
-  const known = [target.sent, target.committed].map((json) => textOf(JSON.parse(json)));
-  if (!known.includes(textOf(view.marks)) && !isBeingChanged(target)) replace(target, view);
+/** Adopts marks that another page or program has changed. Marks that are being changed here stay, and those that this server (which may be a restarted one) did not take, unless it has other ones than before. */
+export function adoptChange(target, view, isRestarted) {
+  const { advice, saved, note } = view;
+  const isRefused = target.saved.state === "refused";
+  const known = isRestarted || "lost" in target.saved ? [target.sent, target.committed] : [target.committed];
+  if (!known.some((json) => textOf(JSON.parse(json)) === textOf(view.marks))) {
+    if (!isBeingChanged(target)) replace(target, view, isRefused && "these marks were changed elsewhere");
+  } else if (!isRefused) Object.assign(target, { advice, saved, note });
 }
 
 /** Makes the current marks an undoable step, and saves them. `found`: how a new outline was found; a stroke is a step even if it changes nothing. */
@@ -75,6 +80,8 @@ export async function save(target) {
       target.saved = { state: "refused", why: "sdg annotate does not answer; the marks are kept in this browser", lost: true };
       changed();
       await present();
+      // The marks may have been replaced by those of the restarted server.
+      if (target.saved.state !== "refused") sent = target.revision;
       continue;
     }
     sent = target.revision;
@@ -85,12 +92,11 @@ export async function save(target) {
     } catch (error) {
       if (error.image) {
         while (isBeingChanged(target)) await wait(50);
-        replace(target, error.image);
+        replace(target, error.image, error.message);
         sent = target.revision;
-        toast(`${target.name}: ${error.message}. “Undo” restores it.`);
       } else {
         // Marks that the server did not take are kept and sent again, as those that it could not write to disk.
-        target.saved = { state: "refused", why: error.message, lost: error.lost, by_disk: !error.lost };
+        target.saved = { state: "refused", why: error.message, lost: error.lost, by_disk: error.isPassing };
         if (error.lost) sent = -1;
       }
     }

@@ -2,7 +2,8 @@
 
 import { api } from "./api.js";
 import { button, by, element } from "./elements.js";
-import { adoptModels, changed, isLive, state } from "./store.js";
+import { adoptFrom } from "./server_end.js";
+import { changed, isLive, state } from "./store.js";
 import { adoptPhoto, adoptTrial, openImage, openTrialPicture } from "./strip.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
@@ -17,11 +18,7 @@ const offered = (role) => state.others.filter(({ is_tried: isTried }) => role ==
 
 const isWithoutPhoto = () => !state.images.length && !state.camera;
 
-async function refresh() {
-  const session = await api.session();
-  Object.assign(state, { others: session.others, label: session.label, isNamed: session.is_named });
-  adoptModels(session);
-}
+const refresh = () => adoptFrom(api.session());
 
 function took(view) {
   openTab("mark");

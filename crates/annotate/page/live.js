@@ -74,7 +74,7 @@ async function look() {
   const size = [width, height];
   const isOther = live.url === null || String(size) !== String(live.size);
   const old = live.url;
-  Object.assign(live, { number, size, url, failed: null, ...found });
+  Object.assign(live, { number, size, url, failed: null, paused: false, ...found });
   if (isOther) showCurrent();
   else replacePicture(url);
   if (old) URL.revokeObjectURL(old);

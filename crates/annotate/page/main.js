@@ -62,10 +62,6 @@ async function open(session) {
   belongTo(session);
   const teaching = await api.teaching();
   Object.assign(state, {
-    label: session.label,
-    isNamed: session.is_named,
-    others: session.others,
-    project: session.project,
     isCalibrated: session.is_calibrated,
     teaching,
     camera: session.camera,

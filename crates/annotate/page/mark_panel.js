@@ -5,6 +5,7 @@ import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setToo
 import { button, by, element, offBecause, setText, shows } from "./elements.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isComplete, isMarking, marks, state } from "./store.js";
+import { adoptFrom } from "./server_end.js";
 import { removePhoto } from "./strip.js";
 import { toast } from "./toast.js";
 
@@ -54,14 +55,11 @@ by("delete").addEventListener("click", deleteSelected);
 
 async function rename() {
   try {
-    const session = await api.rename(label.value);
-    Object.assign(state, { label: session.label, isNamed: session.is_named });
-    for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id && known.saved.state !== "refused") ?? {}, { saved });
+    await adoptFrom(api.rename(label.value));
   } catch (error) {
     toast(error.message);
   }
   label.value = state.label;
-  changed();
 }
 label.addEventListener("change", rename);
 by("keep-name").addEventListener("click", rename);

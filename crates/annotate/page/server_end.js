@@ -4,8 +4,8 @@
 import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adoptChange, save, textOf } from "./editing.js";
 import { by, stored, wait } from "./elements.js";
-import { changed, state } from "./store.js";
-import { adoptSession, showCurrent } from "./strip.js";
+import { changed, image, state, trialPicture } from "./store.js";
+import { adoptSession, drop, openImage, showCurrent } from "./strip.js";
 import { follow } from "./teach.js";
 import { toast } from "./toast.js";
 import { listText } from "./words.js";
@@ -58,6 +58,17 @@ onLoss((lost) => {
   } else toast("sdg annotate answers again.");
 });
 
+/** Makes a change of the lists of pictures. The pictures on the stage stay there unless they are removed. */
+function keepStage(change) {
+  const [shown, tried] = [image(), trialPicture()];
+  change();
+  state.current = Math.max(state.images.indexOf(shown), 0);
+  state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
+  if (image() !== shown) openImage(state.current);
+  if ((shown && !image()) || trialPicture() !== tried) showCurrent();
+  changed();
+}
+
 /** Adopts the numbers of a restarted server, if there is one; then waiting marks are sent. */
 async function meetAgain() {
   let session;
@@ -67,9 +78,8 @@ async function meetAgain() {
     // The next check tries again.
     return;
   }
-  // The server was started without this project: waiting marks are kept and sent when it is opened again. After a start with another camera or name, the page is loaded anew.
-  const settings = ({ project, camera, label }, isCalibrated) => String([project, camera, label, isCalibrated]);
-  if (session.start || settings(session, session.is_calibrated) !== settings(state, state.isCalibrated)) return location.reload();
+  // The server was started without this project: waiting marks are kept and sent when it is opened again. After a start with another camera, the page is loaded anew.
+  if (session.project !== state.project || session.camera !== state.camera || session.is_calibrated !== state.isCalibrated) return location.reload();
   // Another call of this function was faster.
   if (!isLost()) return;
   const gone = [];
@@ -80,24 +90,21 @@ async function meetAgain() {
     else take(entry, views.splice(at, 1)[0]);
     return at >= 0;
   });
-  const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
-  state.images = renumbered(state.images, session.images, (known, view) => {
-    known.id = view.id;
-    if (!isUnsaved(known)) adoptChange(known, view);
+  keepStage(() => {
+    state.images = renumbered(state.images, session.images, (known, view) => {
+      known.id = view.id;
+      adoptChange(known, view, true);
+    });
+    state.trialPictures = renumbered(state.trialPictures, session.trial_pictures, Object.assign);
+    adoptSession(session);
+    belongTo(session);
   });
-  state.trialPictures = renumbered(state.trialPictures, session.trial_pictures, Object.assign);
-  adoptSession(session);
-  state.current = Math.max(state.images.indexOf(shown), 0);
-  state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
-  belongTo(session);
   setLost(false);
   // The server knows none of the marks that were refused.
   state.images.filter(isUnsaved).forEach(save);
   sendKept();
   api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
   if (gone.length) toast(`No longer there: ${gone.join(", ")}.`);
-  if (state.images[state.current] !== shown || state.trialPictures[state.trial] !== tried) showCurrent();
-  changed();
 }
 
 /** Sends this project's marks that were stored when the page, here or in another tab, was closed or reloaded without a server. */
@@ -121,21 +128,24 @@ export async function sendKept() {
 
 window.addEventListener("pagehide", keep);
 
-/** Adopts marks that another page of the session has changed (the next change here would write over them), its further pictures, and its choice of model and region. */
-async function adoptChanges() {
-  if (isLost() || document.hidden) return;
+/** Adopts a session that was asked for: marks that another page or program has changed (the next change here would write over them), further pictures, removed photos, the name, the offered pictures, and the choice of model and region. */
+export async function adoptFrom(asked) {
   const before = state.images.map((target) => [target, target.revision]);
-  // If the server is gone, a banner says so.
-  const session = await api.session().catch(() => null);
-  if (!session) return;
-  adoptSession(session);
-  for (const [target, revision] of before) {
-    const view = session.images.find(({ id }) => id === target.id);
-    if (view && revision === target.revision && !target.saving) adoptChange(target, view);
-  }
-  keep();
-  // The stage shows the first picture of a page that had none.
-  (by("photo").hidden ? showCurrent : changed)();
+  const session = await asked;
+  keepStage(() => {
+    for (const [target, revision] of before) {
+      const view = session.images.find(({ id }) => id === target.id);
+      if (!view) drop(state.images, target);
+      else if (revision === target.revision && !target.saving) adoptChange(target, view);
+    }
+    adoptSession(session);
+  });
+}
+
+async function adoptChanges() {
+  // Before a project is chosen, there is nothing to adopt. If the server is gone, a banner says so.
+  if (isLost() || document.hidden || state.project === undefined) return;
+  await adoptFrom(api.session()).then(keep, () => null);
 }
 for (const kind of ["focus", "visibilitychange"]) window.addEventListener(kind, adoptChanges);
 

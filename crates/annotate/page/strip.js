@@ -49,11 +49,18 @@ export function adoptTrial(view) {
   else state.trialPictures.push({ detections: null, ...view });
 }
 
-/** Adopts the pictures and the models of a session, which another page may have changed. */
+/** Adopts the names, the pictures and the models of a session, which another page may have changed. */
 export function adoptSession(session) {
+  const { label, is_named: isNamed, project, others } = session;
+  Object.assign(state, { label, isNamed, project, others });
   session.images.forEach(adoptPhoto);
   session.trial_pictures.forEach(adoptTrial);
   adoptModels(session);
+}
+
+/** Removes an entry, if it is there. */
+export function drop(entries, target) {
+  if (entries.includes(target)) entries.splice(entries.indexOf(target), 1);
 }
 
 /** Removes a photo or a picture to try from the session; its file is kept, and it can be restored. */
@@ -61,7 +68,7 @@ async function remove(entries, target, { takeOut, putBack, open }) {
   const index = entries.indexOf(target);
   try {
     const session = await takeOut(target.id);
-    entries.splice(entries.indexOf(target), 1);
+    drop(entries, target);
     adoptSession(session);
     const back = async () => {
       try {

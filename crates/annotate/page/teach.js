@@ -224,7 +224,7 @@ export function renderTeach() {
   const marked = state.images.filter(isComplete);
   const negatives = state.trialPictures.filter((trial) => trial.is_absent).length;
   by("teach-from").textContent = isRunning()
-    ? materialText(news.photos, news.negatives)
+    ? news.photos ? materialText(news.photos, news.negatives) : ""
     : marked.length ? materialText(marked.length, negatives) : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];

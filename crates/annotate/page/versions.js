@@ -13,7 +13,7 @@ const list = by("version-list");
 const MIN_DROP = 0.1;
 const GRADES = { doubtful: "doubtful on new samples", poor: "poor on new samples" };
 const DIFFERS = { turned: ", ≠ hand turned", moved: ", ≠ hand elsewhere" };
-/** The versions selected for comparison, and those of the last comparison. */
+/** The versions selected for comparison, and those of a comparison under way. */
 let chosen = [];
 let compared = null;
 
@@ -79,7 +79,7 @@ const number = (id) => `Model ${id + 1}`;
 async function use(id) {
   try {
     adoptModels(await api.useModel(id));
-    toast("This version is now in use, under the model’s name.");
+    toast("This version is now in use.");
   } catch (error) {
     toast(error.message);
   }
@@ -87,6 +87,8 @@ async function use(id) {
 }
 
 async function compare() {
+  // Asked for again while it is under way.
+  if (String(compared) === String(chosen)) return;
   const pair = (compared = chosen);
   const out = by("compared");
   out.textContent = "Looking at all pictures with both…";
@@ -106,6 +108,7 @@ async function compare() {
   } catch (error) {
     if (pair === compared) out.textContent = error.message;
   }
+  if (pair === compared) compared = null;
 }
 
 function table(rows, pair) {

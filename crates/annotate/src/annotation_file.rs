@@ -15,6 +15,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 use sdg_files::{data_yaml_of, marks_of_photo, other_npy_of, write_atomically};
@@ -26,6 +27,8 @@ use crate::names::file_name;
 
 /// Maximum size of an annotation file.
 const MAX_BYTES: u64 = 64 << 20;
+/// Smaller differences of the times of two files are those of copying them.
+const MIN_LATER: Duration = Duration::from_secs(10);
 
 /// The contents of the annotation file when a picture is opened.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,10 +136,11 @@ fn is_of_others(path: &Path, picture: &str) -> bool {
     file.is_some_and(|file| file["images"].as_array().is_some_and(|images| images.iter().all(is_other)))
 }
 
-/// Whether a file was written later than another one.
+/// Whether a file was written later than another one, and not only copied later.
 fn is_newer(one: &Path, other: &Path) -> bool {
     let written = |path: &Path| fs::metadata(path).and_then(|metadata| metadata.modified());
-    written(one).is_ok_and(|one| written(other).is_ok_and(|other| one > other))
+    let is_later = |one: SystemTime, other| one.duration_since(other).is_ok_and(|later| later > MIN_LATER);
+    written(one).is_ok_and(|one| written(other).is_ok_and(|other| is_later(one, other)))
 }
 
 /// The bytes of a file and the objects in it; `None` without a file, and for another text that was not named.
@@ -229,7 +233,6 @@ mod tests {
     use super::*;
     use crate::marks::GraspMarks;
     use sdg_demonstration::CocoFile;
-    use std::time::{Duration, SystemTime};
 
     const SIZE: [u32; 2] = [200, 100];
 
@@ -275,7 +278,11 @@ mod tests {
         assert_eq!((again.marks, again.note), (marks(), None), "the newer file is the one that counts");
         // The tool's later changes are not read, and a note says so.
         let file = fs::File::options().write(true).open(folder.path().join("photo.json")).unwrap();
-        file.set_modified(SystemTime::now() + Duration::from_secs(60)).unwrap();
+        let set = |secs| file.set_modified(SystemTime::now() + Duration::from_secs(secs)).unwrap();
+        // A copy of both files may have been written in any order.
+        set(3);
+        assert_eq!(open(&picture, None, SIZE).unwrap().note, None);
+        set(60);
         let later = open(&picture, None, SIZE).unwrap();
         assert_eq!(later.marks, marks());
         assert!(later.note.unwrap().starts_with("photo.json was written after photo.coco.json"));

@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::names::{free_numbered, relative};
+use crate::project_file::versions_in;
 use crate::teacher::TaughtSummary;
 
 /// Maximum size of a model file.
@@ -99,37 +100,34 @@ impl ModelVersions {
         absolute(&self.default_folder).parent().map(Path::to_owned).unwrap_or_default()
     }
 
-    /// Writes a new version under its own name and makes it the one in use, at `path` or, if that is the model in use
-    /// of another project, at a numbered path. Returns this path.
+    /// Writes a new version under its own name and makes it the one in use, at `path`.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<PathBuf> {
+    pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<()> {
         fs::create_dir_all(&self.folder).map_err(Error::file(&self.folder, "cannot make this folder"))?;
-        let path = self.own_path(path)?;
-        self.keep_foreign(&path)?;
-        let name = format!("{}-{}-{}.sdg", stem(&path), version.summary.model, stamp(version.taught_secs));
+        self.keep_foreign(path)?;
+        let name = format!("{}-{}-{}.sdg", stem(path), version.summary.model, stamp(version.taught_secs));
         let file = free_numbered(&self.folder.join(name));
         write_atomically(&file, bytes)?;
-        write_atomically(&path, bytes)?;
+        write_atomically(path, bytes)?;
         let file = match file.strip_prefix(&self.default_folder) {
             Ok(name) => name.to_string_lossy().into_owned(),
             Err(_) => relative(&self.project(), &absolute(&file)),
         };
         self.versions.push(Version { file, ..version });
         self.current = Some(self.versions.len() - 1);
-        Ok(path)
+        Ok(())
     }
 
-    /// Makes a version the one in use, at the path that [`Self::keep`] would use.
+    /// Makes a version the one in use, at `path`.
     ///
     /// # Errors
     /// Unknown version, or files cannot be read or written.
     pub fn use_version(&mut self, path: &Path, id: usize) -> Result<Vec<u8>> {
         let bytes = self.read(id)?;
-        let path = self.own_path(path)?;
-        self.keep_foreign(&path)?;
-        write_atomically(&path, &bytes)?;
+        self.keep_foreign(path)?;
+        write_atomically(path, &bytes)?;
         self.current = Some(id);
         Ok(bytes)
     }
@@ -151,26 +149,24 @@ impl ModelVersions {
         (0..self.versions.len()).rev().any(|id| self.read(id).is_ok_and(|bytes| bytes == content))
     }
 
-    /// `path`, or the first numbered path that is not the model in use of another project in the folder: no version,
-    /// although the folder of versions has a file with the same content.
-    fn own_path(&self, path: &Path) -> Result<PathBuf> {
-        let is_in_folder = |content: &[u8]| {
-            let paths = fs::read_dir(&self.folder).into_iter().flatten().flatten().map(|entry| entry.path());
-            let is_same_size = |path: &PathBuf| fs::metadata(path).is_ok_and(|file| file.len() == content.len() as u64);
-            paths.filter(is_same_size).any(|path| fs::read(path).is_ok_and(|bytes| bytes == content))
-        };
-        let mut own = path.to_owned();
-        for number in 2.. {
-            if !own.exists() {
-                break;
-            }
-            let standing = fs::read(&own).map_err(Error::file(&own, "cannot read"))?;
-            if self.is_version(&standing) || !is_in_folder(&standing) {
-                break;
-            }
-            own = path.with_file_name(format!("{}-{number}.sdg", stem(path)));
+    /// `path`, unless that is the model in use of another project in the folder; then the first numbered path that is
+    /// free or has a version of this project.
+    ///
+    /// # Errors
+    /// The file at `path` cannot be read.
+    pub fn own_path(&self, path: &Path) -> Result<PathBuf> {
+        let is_own = |path: &Path| !path.exists() || fs::read(path).is_ok_and(|standing| self.is_version(&standing));
+        if is_own(path) {
+            return Ok(path.to_owned());
         }
-        Ok(own)
+        let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
+        // The other projects of the folder have the same folder of versions.
+        let others = Self { versions: versions_in(&self.project()), ..self.clone() };
+        if !others.is_version(&standing) {
+            return Ok(path.to_owned());
+        }
+        let numbered = |number: usize| path.with_file_name(format!("{}-{number}.sdg", stem(path)));
+        Ok((2..).map(numbered).find(|path| is_own(path)).expect("numbers do not run out"))
     }
 
     /// Copies the file at `path` into the folder of versions, unless it is a known version.
@@ -224,6 +220,7 @@ pub fn fingerprint(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::project_file::{ProjectFile, ProjectPlace};
     use sdg_demonstration::ModelKind;
 
     fn version(taught_secs: u64) -> Version {
@@ -281,12 +278,26 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let versions = || ModelVersions { folder: at("models"), default_folder: at("models"), ..Default::default() };
         let (mut one, mut other) = (versions(), versions());
-        assert_eq!(one.keep(&at("rod.sdg"), b"first", version(60)).unwrap(), at("rod.sdg"));
-        assert_eq!(other.keep(&at("rod.sdg"), b"second", version(60)).unwrap(), at("rod-2.sdg"));
-        assert_eq!(other.keep(&at("rod.sdg"), b"third", version(60)).unwrap(), at("rod-2.sdg"));
-        other.use_version(&at("rod.sdg"), 0).unwrap();
-        let texts = ["rod.sdg", "rod-2.sdg"].map(|name| fs::read_to_string(at(name)).unwrap());
-        assert_eq!(texts, ["first", "second"]);
+        // A file that no project names is replaced, although the folder of versions has it, too.
+        fs::create_dir(at("models")).unwrap();
+        for name in ["rod.sdg", "models/rod-19700101-000000.sdg"] {
+            fs::write(at(name), "restored").unwrap();
+        }
+        assert_eq!(one.own_path(&at("rod.sdg")).unwrap(), at("rod.sdg"));
+        one.keep(&at("rod.sdg"), b"first", version(60)).unwrap();
+        let file = at("a.sdg-project.json");
+        let place = ProjectPlace { folder: folder.path().to_owned(), file, is_folder: false };
+        ProjectFile { models: one.versions.clone(), ..ProjectFile::default() }.write(&place).unwrap();
+        // A numbered file that is no version is kept.
+        fs::write(at("rod-2.sdg"), "the user's").unwrap();
+        for bytes in ["second", "third"] {
+            let path = other.own_path(&at("rod.sdg")).unwrap();
+            assert_eq!(path, at("rod-3.sdg"));
+            other.keep(&path, bytes.as_bytes(), version(60)).unwrap();
+        }
+        other.use_version(&at("rod-3.sdg"), 0).unwrap();
+        let texts = ["rod.sdg", "rod-2.sdg", "rod-3.sdg"].map(|name| fs::read_to_string(at(name)).unwrap());
+        assert_eq!(texts, ["first", "the user's", "second"]);
         // A part with another name has its model there, too, unless that is the name of another file.
         other.write_current(&at("bar.sdg")).unwrap();
         other.write_current(&at("rod.sdg")).unwrap();

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::model_versions::Version;
-use crate::names::{PROJECT_FILE, relative};
+use crate::names::{PROJECT_FILE, file_name, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::region::Searched;
 
@@ -95,6 +95,14 @@ pub fn names_in_project(photo: &Path) -> Result<Vec<String>> {
     Ok(photos)
 }
 
+/// The versions of the models of all projects in a folder whose files can be read.
+pub fn versions_in(folder: &Path) -> Vec<Version> {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let files = files.filter(|file| file_name(file).ends_with(PROJECT_FILE));
+    let place = |file| ProjectPlace { folder: folder.to_owned(), file, is_folder: false };
+    files.filter_map(|file| ProjectFile::read(&place(file)).ok().flatten()).flat_map(|project| project.models).collect()
+}
+
 /// The name of the part in the project of a folder or photo, if it has one.
 pub fn label_of(opened: &Path) -> Option<String> {
     let place = if opened.is_dir() { ProjectPlace::of_folder(opened) } else { ProjectPlace::of_photo(opened).ok()? };
@@ -155,6 +163,8 @@ pub struct Tried {
 pub struct Gone {
     pub photos: Vec<String>,
     pub tried: Vec<Tried>,
+    /// The photos that the project's file named, also those that are there. The first one is the reference.
+    pub order: Vec<String>,
     /// A sentence for the user about each picture that is left out: these, and unreadable ones that were added to the
     /// folder; and one about those beyond the maximum number.
     pub notes: Vec<String>,
@@ -253,9 +263,10 @@ impl ProjectFile {
         let mut file = read.unwrap_or_default();
         let folder = &place.folder;
         let is_there = |name: &String| folder.join(name).is_file();
+        let order = file.photos.clone();
         let (photos, gone_photos) = file.photos.drain(..).partition(is_there);
         let (tried, gone_tried) = file.tried.drain(..).partition(|tried: &Tried| is_there(&tried.file));
-        let mut gone = Gone { photos: gone_photos, tried: gone_tried, notes: Vec::new() };
+        let mut gone = Gone { photos: gone_photos, tried: gone_tried, order, notes: Vec::new() };
         let names = gone.photos.iter().chain(gone.tried.iter().map(|tried| &tried.file));
         gone.notes = names.map(|name| format!("{name} does not exist now; the project still names it.")).collect();
         (file.photos, file.tried) = (photos, tried);
@@ -272,11 +283,15 @@ impl ProjectFile {
         Ok((file, gone))
     }
 
-    /// Appends the names of the missing files, so that the project still contains them.
+    /// Adds the names of the missing files, so that the project still contains them: photos at their earlier places.
     pub fn keep_missing(&mut self, gone: &Gone) {
-        let photos = gone.photos.iter().filter(|name| !self.photos.contains(name));
-        let photos: Vec<String> = photos.cloned().collect();
-        self.photos.extend(photos);
+        let place = |name: &String| gone.order.iter().position(|known| known == name).unwrap_or(usize::MAX);
+        for name in &gone.photos {
+            if !self.photos.contains(name) {
+                let next = self.photos.iter().position(|other| place(other) > place(name));
+                self.photos.insert(next.unwrap_or(self.photos.len()), name.clone());
+            }
+        }
         let is_new = |tried: &&Tried| self.tried.iter().all(|known| known.file != tried.file);
         let tried: Vec<Tried> = gone.tried.iter().filter(is_new).cloned().collect();
         self.tried.extend(tried);

@@ -64,6 +64,17 @@ fn model_file(home: &Path, label: &str) -> PathBuf {
     home.with_file_name(format!("{}.sdg", safe_stem(label)))
 }
 
+/// The given file of the model in use, or [`model_file`], with a number if another project uses that.
+///
+/// # Errors
+/// A file of that name cannot be read.
+fn model_path(given: Option<&Path>, home: &Path, state: &State) -> Result<PathBuf> {
+    match given {
+        Some(path) => Ok(path.to_owned()),
+        None => state.models.own_path(&model_file(home, &state.label)),
+    }
+}
+
 /// The name of a part without surrounding spaces.
 ///
 /// # Errors
@@ -128,20 +139,24 @@ impl Session {
     }
 
     /// Locks the marks of a photo against other processes before they are written, unless this session has locked them.
-    /// Returns whether another process has changed them since they were read; they are then read again.
+    /// Returns whether another process has changed them since they were read without the lock; they are then read
+    /// again.
     ///
     /// # Errors
     /// Another process has locked the file, too many files are open, or changed marks cannot be read.
     fn lock_marks(&self, state: &mut State, photo: &Path) -> Result<bool> {
         let file = state.marks_file(photo).unwrap_or_else(|| photo.with_extension("json"));
+        let id = state.image_at(photo);
         if self.locks().iter().any(|lock| lock.is_of(&file)) {
-            return Ok(false);
+            let unlocked = id.filter(|&id| state.images[id].is_read_unlocked);
+            return unlocked.map_or(Ok(false), |id| state.read_again(id));
         }
         let Some(lock) = WriterLock::take(&file)? else { return Ok(false) };
-        let is_changed = match state.image_at(photo) {
-            Some(id) => state.read_again(id)?,
-            None => false,
-        };
+        let is_changed = id.map_or(Ok(false), |id| state.read_again(id))?;
+        for other in (0..state.images.len()).filter(|&other| Some(other) != id) {
+            let is_of_file = state.marks_file(&state.images[other].picture.path).as_ref() == Some(&file);
+            state.images[other].is_read_unlocked |= is_of_file;
+        }
         self.locks().push(lock);
         Ok(is_changed)
     }

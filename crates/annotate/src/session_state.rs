@@ -63,6 +63,8 @@ pub struct MarkedPicture {
     pub saved: Saved,
     /// Whether a file had marks of it when it was opened.
     pub was_marked: bool,
+    /// Its marks were read before their file was locked to write those of another photo in the same file.
+    pub is_read_unlocked: bool,
     pub is_removed: bool,
 }
 
@@ -166,7 +168,9 @@ impl State {
         let known = &self.images[id];
         let (now, _) = self.open_photo(known.picture.clone())?;
         let is_kept = matches!(known.saved, Saved::Refused { .. }) || rounded(&now.marks) == rounded(&known.marks);
-        if !is_kept {
+        if is_kept {
+            self.images[id].is_read_unlocked = false;
+        } else {
             self.images[id] = MarkedPicture { is_removed: known.is_removed, ..now };
         }
         Ok(!is_kept)
@@ -338,7 +342,8 @@ impl MarkedPicture {
     /// A picture with marks that are in no file.
     pub fn unsaved(picture: Picture, marks: Marks) -> Self {
         let (file, saved) = (PathBuf::new(), Saved::Nothing);
-        Self { picture, marks, file, note: None, saved, was_marked: false, is_removed: false }
+        let [was_marked, is_read_unlocked, is_removed] = [false; 3];
+        Self { picture, marks, file, note: None, saved, was_marked, is_read_unlocked, is_removed }
     }
 
     /// A picture with the marks in the file beside it, or in `annotation`, and the object's name in that file.
@@ -353,7 +358,8 @@ impl MarkedPicture {
         let was_marked = found.is_some();
         let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
         let (marks, file, note) = (opened.marks, opened.path, opened.note);
-        Ok((Self { picture, marks, file, note, saved, was_marked, is_removed: false }, opened.label))
+        let [is_read_unlocked, is_removed] = [false; 2];
+        Ok((Self { picture, marks, file, note, saved, was_marked, is_read_unlocked, is_removed }, opened.label))
     }
 
     /// Checks that no other photo has its marks in the same file, as `part.png` and `part.jpg` would.

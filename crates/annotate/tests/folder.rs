@@ -6,7 +6,7 @@ use crate::served::{InPlace, Served, photo, photo_png};
 use image::codecs::png::PngEncoder;
 use image::{ImageEncoder, RgbImage};
 use sdg_annotate::{Marks, Session, SessionOptions, Status};
-use sdg_demonstration::PixelFrame;
+use sdg_demonstration::{CocoFile, PixelFrame};
 use serde_json::{Value, json};
 
 const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
@@ -148,7 +148,7 @@ fn a_photo_of_the_project_whose_marks_do_not_fit_is_left_out() {
     // Without these marks it is a photo of the project again.
     let folder = served.end();
     std::fs::remove_file(folder.path().join("other.json")).unwrap();
-    assert_eq!(names(&session(&Served::of_project(folder))["images"]), ["rod.png", "other.png"]);
+    assert_eq!(names(&session(&Served::of_project(folder))["images"]), ["other.png", "rod.png"], "in the same order");
 }
 
 #[test]
@@ -205,6 +205,51 @@ fn the_file_of_a_photo_s_marks_is_recorded() {
     std::fs::rename(at("marked.json"), at("other.json")).unwrap();
     let view = open(rod()).view();
     assert_eq!((view.images[1].marks.bbox, view.notes.len()), (bbox, 0), "{:?}", view.notes);
+}
+
+#[test]
+fn changed_marks_in_a_file_of_several_photos_are_not_overwritten() {
+    let folder = folder_of(&["a.png", "b.png"]);
+    let at = |name: &str| folder.path().join(name);
+    let mut all = CocoFile::new();
+    for name in ["a.png", "b.png"] {
+        all.push_image(name, 200, 100, &[]);
+    }
+    std::fs::write(at("all.json"), all.to_json()).unwrap();
+    let open = |marks: Option<&str>| {
+        let images = ["a.png", "b.png"].map(|name| (at(name), marks.map(at))).to_vec();
+        Session::open(&SessionOptions { images, ..SessionOptions::default() }, Arc::new(InPlace)).unwrap()
+    };
+    let marks = Marks { bbox: Some([40.0, 40.0, 140.0, 60.0]), ..Marks::default() };
+    let first = open(Some("all.json"));
+    first.set_marks(0, marks.clone()).unwrap();
+    // Another program, before the first change of the second photo here.
+    let text = std::fs::read_to_string(at("all.a.png.coco.json")).unwrap();
+    std::fs::write(at("all.b.png.coco.json"), text.replace("a.png", "b.png")).unwrap();
+    let refused = first.set_marks(1, Marks::default()).unwrap_err().to_string();
+    assert!(refused.contains("another program changed these marks"), "{refused}");
+    assert_eq!(first.marks(1).unwrap(), marks);
+    first.set_marks(1, marks).unwrap();
+    drop(first);
+    let told = ["a", "b"].map(|name| format!("The marks of {name}.png are in all.{name}.png.coco.json."));
+    assert_eq!(open(None).view().notes, told);
+}
+
+#[test]
+fn a_photo_that_comes_back_during_the_session_is_that_of_its_tried_picture() {
+    let served = Served::of_photo(folder_of(&["rod.png"]), "rod.png");
+    served.ask("POST", "/api/trial-pictures?name=found.png", &photo_png()).json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    let folder = served.end();
+    let [photo, away] = ["found.png", "found.away"].map(|name| folder.path().join(name));
+    std::fs::rename(&photo, &away).unwrap();
+    let served = Served::of_photo(folder, "rod.png");
+    let became = |served: &Served| session(served)["trial_pictures"][0]["became"].clone();
+    assert_eq!(became(&served), Value::Null);
+    std::fs::rename(&away, &photo).unwrap();
+    assert_eq!(names(&session(&served)["others"]), ["found.png"]);
+    served.ask("POST", "/api/others/0/photo", b"").json();
+    assert_eq!(became(&served), 1);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use sdg_files::absolute;
 
 use super::Session;
 use crate::error::{Error, Result};
-use crate::names::{file_name, free_name};
+use crate::names::{file_name, free_name, relative};
 use crate::picture::{Picture, pictures_in};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::views::{ImageView, OtherView, TrialPictureView};
@@ -113,6 +113,13 @@ impl Session {
                 state.images.len() - 1
             }
         };
+        // A missing photo that was made from a tried picture has come back.
+        let name = state.place.as_ref().map(|place| relative(&place.folder, &path));
+        for trial in &mut state.trial_pictures {
+            if name.is_some() && trial.missing_photo == name {
+                (trial.became, trial.missing_photo) = (Some(id), None);
+            }
+        }
         // The picture, or the tried one from which it was made, may have been declared to be without the part.
         let is_same = |trial: &TrialPicture| trial.became == Some(id) || trial.picture.is_at(&path);
         state.trial_pictures.iter_mut().filter(|trial| is_same(trial)).for_each(|trial| trial.is_absent = false);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sdg_demonstration::{Demonstration, ModelKind};
 
-use super::{Session, locked, model_file};
+use super::{Session, locked, model_path};
 use crate::error::{Error, Result};
 use crate::model_versions::{Version, now_secs};
 use crate::picture::Picture;
@@ -31,7 +31,7 @@ impl Session {
         // With the lock, so that a teaching that begins now gets the region that is in use then.
         let mut state = self.state();
         self.teaching.check_idle()?;
-        let path = self.model_path.clone().unwrap_or_else(|| model_file(&self.home, &state.label));
+        let path = model_path(self.model_path.as_deref(), &self.home, &state)?;
         let summary = state.models.get(id)?.summary.clone();
         let bytes = state.models.read(id)?;
         let open = |searched| self.teacher.open(&bytes, &summary, searched);
@@ -128,11 +128,11 @@ impl Session {
             };
             let mut state = locked(&state);
             // The part may have been renamed during the teaching.
-            let path = given_path.unwrap_or_else(|| model_file(&home, &state.label));
-            let written_to = state.models.keep(&path, &bytes, version)?;
+            let path = model_path(given_path.as_deref(), &home, &state)?;
+            state.models.keep(&path, &bytes, version)?;
             state.is_model_lost = false;
             state.save_project()?;
-            Ok(written_to)
+            Ok(path)
         };
         Ok(preparation.start(Arc::clone(&self.teacher), request, material, keep))
     }

@@ -20,6 +20,7 @@ use crate::region::Searched;
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
+use crate::views::Saved;
 
 impl Session {
     /// Opens pictures, their marks and their project.
@@ -93,7 +94,14 @@ impl Session {
                     continue;
                 }
             };
-            notes.extend(recorded.map(|file| format!("The marks of {name} are in {file}.")));
+            notes.extend(recorded.map(|file| {
+                // Changes of marks in another tool's file are in a file beside it.
+                let found = match &image.saved {
+                    Saved::Written { file: found } => Path::new(file).with_file_name(found),
+                    _ => PathBuf::from(file),
+                };
+                format!("The marks of {name} are in {}.", found.display())
+            }));
             label = label.take().or(named);
             images.push(image);
         }

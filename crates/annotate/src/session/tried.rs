@@ -230,8 +230,8 @@ impl Session {
         }
         self.lock_marks(&mut state, &picture.path)?;
         let id = state.add_image(picture, marks)?;
-        state.trial_pictures[trial_id].became = Some(id);
-        state.trial_pictures[trial_id].is_absent = false;
+        let trial = &mut state.trial_pictures[trial_id];
+        (trial.became, trial.missing_photo, trial.is_absent) = (Some(id), None, false);
         self.settle_place(&mut state, id)?;
         if !matches!(state.images[id].saved, Saved::Written { .. }) {
             state.save(id);

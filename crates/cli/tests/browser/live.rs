@@ -195,6 +195,20 @@ fn with_a_calibrated_camera_the_grasp_is_told_in_millimetres() {
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
+fn a_photo_that_another_page_took_is_shown_and_its_project_is_known() {
+    let page = open(&[]);
+    let take = "return import('/page/store.js')
+        .then(({ state }) => fetch(`/api/live/${state.live.number}/photo`, { method: 'POST' }))
+        .then((answer) => { dispatchEvent(new Event('focus')); return answer.ok; })";
+    assert_eq!(page.browser.run(take, &[]).unwrap(), json!(true));
+    page.wait_for("the photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
+    let known = "return import('/page/store.js').then(({ state }) => [state.project !== null, state.tool])";
+    assert_eq!(page.browser.run(known, &[]).unwrap(), json!([true, "box"]));
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
 fn a_kept_frame_whose_search_failed_is_searched_again() {
     let page = open(&[]);
     take_and_mark(&page);

@@ -1,5 +1,7 @@
 //! Marks and pictures that another program or another page changes meanwhile, and marks that the server refuses.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use super::page::Page;
@@ -15,11 +17,7 @@ fn wait_for_note(page: &Page, text: &str) {
 fn marks_that_another_program_changed_are_shown_and_not_written_over() {
     let page = open(&[], &["photo"]);
     let file = page.folder.path().join("project/photo.json");
-    let mut marks: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
-    let left = &mut marks["shapes"][0]["points"][0][0];
-    let before = left.as_f64().unwrap();
-    *left = json!(before - 5.0);
-    std::fs::write(&file, marks.to_string()).unwrap();
+    let before = move_left_edge(&file);
     page.browser.press(&["]"]).unwrap();
     wait_for_note(&page, "another program");
     page.settle();
@@ -83,7 +81,83 @@ fn refused_marks_are_kept_and_sent_again_but_invalid_ones_only_to_another_server
     page.wait_for("no banner", "return document.getElementById('lost').hidden");
     page.wait_for("a check of the server", check);
     assert!(page.text("#saved").starts_with("Not saved"), "{}", page.text("#saved"));
+    assert_eq!(page.browser.run("return window.count", &[]).unwrap(), json!(2));
     assert_eq!(annotation(&file).outline, before);
+}
+
+/// Moves the left edge of the box in a file of LabelMe by 5 pixels; returns its earlier place.
+fn move_left_edge(file: &Path) -> f64 {
+    let mut marks: Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+    let left = &mut marks["shapes"][0]["points"][0][0];
+    let before = left.as_f64().unwrap();
+    *left = json!(before - 5.0);
+    std::fs::write(file, marks.to_string()).unwrap();
+    before
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn marks_that_another_program_changed_are_shown_after_a_change_of_the_name() {
+    let page = open(&[], &["photo"]);
+    let file = page.folder.path().join("project/photo.json");
+    let before = move_left_edge(&file);
+    page.fill("#label", "another name");
+    page.wait_for("the change", "return !document.getElementById('undo').disabled");
+    page.browser.press(&["]"]).unwrap();
+    page.settle();
+    let after = annotation(&file.with_file_name("photo.coco.json")).bbox.x1;
+    assert!((after - (before - 5.0)).abs() < 0.1, "{before} {after}");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn marks_made_without_a_server_do_not_replace_those_of_another_program() {
+    let mut page = open(&["--port", &free_port(), "--token-file", "key"], &["photo"]);
+    let file = page.folder.path().join("project/photo.json");
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.browser.press(&["]"]).unwrap();
+    are_kept(&page);
+    move_left_edge(&file);
+    page.start_server();
+    wait_for_note(&page, "changed elsewhere");
+    page.settle();
+    assert_eq!(page.text("#saved"), "Saved in photo.json");
+    assert!(!file.with_file_name("photo.coco.json").exists());
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn invalid_marks_that_another_page_undid_are_not_shown_any_more() {
+    let page = open(&[], &["photo"]);
+    let cross = "return Promise.all(['store', 'editing'].map((name) => import(`/page/${name}.js`)))
+        .then(([{ image, marks }, { commit }]) => {
+            window.before = image().sent;
+            marks().outline = [[260, 170], [385, 275], [385, 170], [260, 275]];
+            commit();
+        })";
+    page.browser.run(cross, &[]).unwrap();
+    page.wait_for("the refusal", "return document.getElementById('saved').innerText.startsWith('Not saved')");
+    let undo = "return fetch('/api/images/0/marks', { method: 'PUT', body: window.before })
+        .then((answer) => { dispatchEvent(new Event('focus')); return answer.ok; })";
+    assert_eq!(page.browser.run(undo, &[]).unwrap(), json!(true));
+    page.wait_for("saved", "return document.getElementById('saved').innerText === 'Saved in photo.coco.json'");
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_photo_that_another_page_removed_leaves_no_banner() {
+    let page = open(&[], &["earlier", "photo"]);
+    let take_out = "return fetch('/api/images/0', { method: 'DELETE' }).then((answer) => answer.ok)";
+    assert_eq!(page.browser.run(take_out, &[]).unwrap(), json!(true));
+    page.browser.press(&["]"]).unwrap();
+    page.wait_for("the refusal", "return document.getElementById('saved').innerText.startsWith('Not saved')");
+    page.settle_frames();
+    assert_eq!(page.browser.run("return document.getElementById('unsaved').hidden", &[]).unwrap(), json!(true));
+    page.browser.run("dispatchEvent(new Event('focus'))", &[]).unwrap();
+    page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
+    let count = "return import('/page/store.js').then(({ state }) => state.images.length)";
+    assert_eq!(page.browser.run(count, &[]).unwrap(), json!(1));
 }
 
 #[test]
