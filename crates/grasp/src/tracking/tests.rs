@@ -6,7 +6,7 @@ use std::time::Duration;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
-use sdg_geometry::{Angle, GraspLine, PlanarSimilarity, Polygon};
+use sdg_geometry::{GraspLine, PlanarSimilarity, Polygon};
 
 use super::*;
 use crate::drawn_part::{self, at, line};
@@ -294,41 +294,6 @@ fn a_part_that_only_the_search_accepts_is_followed() {
         assert_eq!((parts.len(), parts[0].detection.score), (1, 0.95), "frame {number}");
         assert_at(&parts[0], &pose, &format!("frame {number}"));
     }
-}
-
-/// An object that resembles the part but has another size is tracked until the part lies beside it. Each search then
-/// accepts only the surer one of the two.
-#[test]
-fn a_refused_object_is_no_reference_for_the_size_of_the_part() {
-    let larger = PlanarSimilarity::about(Point2::new(90.0, 70.0), Point2::new(225.0, 140.0), Angle::ZERO, 1.2);
-    let poses = [at(80.0, 80.0, 0.0), larger];
-    let found = drawn_part::model(SIZE).detect(&picture(&poses), Verification::ByShape).unwrap();
-    let nearest = |pose: &PlanarSimilarity| {
-        let off = |found: &&GraspDetection| (found.grasp.center() - line().transformed(pose).center()).norm();
-        found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
-    };
-    let sizes = poses.each_ref().map(|pose| nearest(pose).evidence.unwrap().size);
-    assert!(sizes.contains(&0.0) && sizes.iter().any(|size| *size < -2.0), "{sizes:?}");
-    let [part, other] = if sizes[0] == 0.0 { poses } else { [poses[1], poses[0]] };
-    // Alone, the other object is just accepted.
-    let seen = nearest(&other);
-    let model = model_with_bias(0.5 + seen.evidence.unwrap().size - log_odds(seen.score));
-    let assert_part_alone = |parts: &[TrackedPart]| {
-        let followed: Vec<_> = parts.iter().filter(|part| part.is_followed()).collect();
-        assert_eq!(followed.len(), 1, "{parts:?}");
-        assert_at(followed[0], &part, "the surer one");
-    };
-    // At 10 pictures per second, the changed picture is searched before it is answered.
-    let mut tracker = Tracker::new(model.clone().into(), TrackerConfig::default());
-    let frames = [vec![other], vec![part, other], vec![part, other]];
-    let answers = run_searching_before_answers(&mut tracker, Duration::from_millis(100), &frames);
-    assert_at(&answers[0].1[0], &other, "alone");
-    answers[1..].iter().for_each(|(_, parts)| assert_part_alone(parts));
-    // At 100 pictures per second, the search ends some frames later.
-    let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
-    let all = run(&mut tracker, 45, |number| if number < 12 { vec![other] } else { vec![part, other] });
-    assert_at(&all[11][0], &other, "alone");
-    assert_part_alone(&all[44]);
 }
 
 /// A search finds a part with another photo than its track, from which its pose differs by the difference of the photos.

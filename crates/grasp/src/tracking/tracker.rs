@@ -89,17 +89,8 @@ struct Tracked {
     part: TrackedPart,
     /// Whether the part was lost in the frame before the newest, as returned to the caller.
     was_lost: bool,
-    in_search: InSearch,
-}
-
-/// A track's part in the newest finished search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum InSearch {
-    Accepted,
-    /// The search refused the part only because a surer part of the picture has another size.
-    RefusedBySize,
-    /// The search did not find the part, or refused it for another reason.
-    Unknown,
+    /// Whether the newest finished search accepted its part.
+    is_in_search: bool,
 }
 
 /// The reported data of a track.
@@ -225,40 +216,26 @@ impl Tracker {
         Some((track, Refined { followed, close }, shown))
     }
 
-    /// The reference sizes by demonstration, first that of the surest followed track, then those of lost tracks, the
-    /// last lost first: parts of one sequence have one size, like parts of one picture, so that a look-alike of another
-    /// size is not a lost part. Tracks that the newest search refused because of their size are left out.
+    /// The reference sizes by demonstration, the oldest track's first: parts of one sequence have one size, like parts of
+    /// one picture, so that a look-alike of another size is not a lost part.
     fn log_sizes(&self) -> Vec<(usize, f64)> {
-        let is_reference = |tracked: &&Tracked| tracked.in_search != InSearch::RefusedBySize;
-        let mut references: Vec<&Tracked> = self.tracks.iter().filter(is_reference).collect();
-        references.sort_by(|a, b| {
-            let by_score = b.part.detection.score.total_cmp(&a.part.detection.score);
-            b.track.number.cmp(&a.track.number).then(by_score)
-        });
-        references.iter().map(|tracked| (tracked.track.demonstration_idx(), tracked.track.log_size())).collect()
+        self.tracks.iter().map(|tracked| (tracked.track.demonstration_idx(), tracked.track.log_size())).collect()
     }
 
     /// Notes for each track whether a search of frame `number` accepted its part.
     fn compare_with_search(&mut self, all_found: &[Found], number: u64) {
-        self.tracks.iter_mut().for_each(|tracked| tracked.in_search = InSearch::Unknown);
-        // The best detection comes first.
-        for found in all_found {
-            let Some((idx, ..)) = self.matched(found, number) else { continue };
-            if self.tracks[idx].in_search != InSearch::Unknown {
-                continue;
-            }
-            let without_size = |evidence| self.detector.model().verdict_with_size(evidence, 0.0).0;
-            if found.detection.is_accepted() {
-                self.tracks[idx].in_search = InSearch::Accepted;
-            } else if found.detection.evidence.map(without_size).is_some_and(|score| score >= ACCEPTED) {
-                self.tracks[idx].in_search = InSearch::RefusedBySize;
+        self.tracks.iter_mut().for_each(|tracked| tracked.is_in_search = false);
+        for found in all_found.iter().filter(|found| found.detection.is_accepted()) {
+            if let Some((idx, ..)) = self.matched(found, number) {
+                self.tracks[idx].is_in_search = true;
             }
         }
     }
 
     /// The verdict on an arrived track, given the verdict `judged` in the newest frame. A held track has the verdict of
     /// the search, which may have rectified the picture of a slanted camera. The search compared the part's size with
-    /// the sizes of the parts that it found. If no track is among them, the size counts as in `judged`.
+    /// those of the parts that it found. If the reference of [`Self::log_sizes`] is not among them, the size counts as
+    /// in `judged`.
     fn verdict_on_arrived(
         &self,
         track: &Track,
@@ -266,9 +243,9 @@ impl Tracker {
         judged: (f64, Contributions),
     ) -> (f64, Contributions) {
         let Some((score, evidence)) = track.held_verdict(followed) else { return judged };
-        let of_photo = |tracked: &&Tracked| tracked.track.demonstration_idx() == track.demonstration_idx();
-        let in_search: Vec<InSearch> = self.tracks.iter().filter(of_photo).map(|tracked| tracked.in_search).collect();
-        if in_search.contains(&InSearch::Accepted) || !in_search.contains(&InSearch::Unknown) {
+        let reference =
+            self.tracks.iter().find(|tracked| tracked.track.demonstration_idx() == track.demonstration_idx());
+        if reference.is_none_or(|reference| reference.is_in_search) {
             return (score, evidence);
         }
         self.detector.model().verdict_with_size(evidence, judged.1.size)
@@ -524,7 +501,7 @@ impl Tracker {
             let age = captured.saturating_sub(track.first_seen);
             let unseen_for = Duration::ZERO;
             let part = TrackedPart { id: track.id, state: TrackState::Followed, age, unseen_for, detection, pose };
-            self.tracks.push(Tracked { track, part, was_lost: false, in_search: InSearch::Accepted });
+            self.tracks.push(Tracked { track, part, was_lost: false, is_in_search: true });
         }
     }
 
@@ -587,7 +564,7 @@ impl Tracked {
     /// Continues from another track's pose of the same part.
     fn go_on_as(&mut self, other: Track, captured: Duration, shown: Shown) {
         self.track.replace_by(other);
-        self.in_search = InSearch::Accepted;
+        self.is_in_search = true;
         self.show(captured, shown);
     }
 }
