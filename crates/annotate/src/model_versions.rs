@@ -21,7 +21,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::names::{free_numbered, relative};
-use crate::project_file::versions_in;
 use crate::teacher::TaughtSummary;
 
 /// Maximum size of a model file.
@@ -96,7 +95,7 @@ impl ModelVersions {
     }
 
     /// The absolute path of the project's folder.
-    fn project(&self) -> PathBuf {
+    pub fn project(&self) -> PathBuf {
         absolute(&self.default_folder).parent().map(Path::to_owned).unwrap_or_default()
     }
 
@@ -149,20 +148,19 @@ impl ModelVersions {
         (0..self.versions.len()).rev().any(|id| self.read(id).is_ok_and(|bytes| bytes == content))
     }
 
-    /// `path`, unless that is the model in use of another project in the folder; then the first numbered path that is
-    /// free or has a version of this project.
+    /// `path`, unless a version of another project stands there; then the first numbered path that is free or has a
+    /// version of this project. `all` gives the versions of all projects of the folder, which share a folder of
+    /// versions.
     ///
     /// # Errors
     /// The file at `path` cannot be read.
-    pub fn own_path(&self, path: &Path) -> Result<PathBuf> {
+    pub fn own_path(&self, path: &Path, all: impl FnOnce() -> Vec<Version>) -> Result<PathBuf> {
         let is_own = |path: &Path| !path.exists() || fs::read(path).is_ok_and(|standing| self.is_version(&standing));
         if is_own(path) {
             return Ok(path.to_owned());
         }
         let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
-        // The other projects of the folder have the same folder of versions.
-        let others = Self { versions: versions_in(&self.project()), ..self.clone() };
-        if !others.is_version(&standing) {
+        if !(Self { versions: all(), ..self.clone() }).is_version(&standing) {
             return Ok(path.to_owned());
         }
         let numbered = |number: usize| path.with_file_name(format!("{}-{number}.sdg", stem(path)));
@@ -220,7 +218,6 @@ pub fn fingerprint(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::project_file::{ProjectFile, ProjectPlace};
     use sdg_demonstration::ModelKind;
 
     fn version(taught_secs: u64) -> Version {
@@ -283,15 +280,12 @@ mod tests {
         for name in ["rod.sdg", "models/rod-19700101-000000.sdg"] {
             fs::write(at(name), "restored").unwrap();
         }
-        assert_eq!(one.own_path(&at("rod.sdg")).unwrap(), at("rod.sdg"));
+        assert_eq!(one.own_path(&at("rod.sdg"), Vec::new).unwrap(), at("rod.sdg"));
         one.keep(&at("rod.sdg"), b"first", version(60)).unwrap();
-        let file = at("a.sdg-project.json");
-        let place = ProjectPlace { folder: folder.path().to_owned(), file, is_folder: false };
-        ProjectFile { models: one.versions.clone(), ..ProjectFile::default() }.write(&place).unwrap();
         // A numbered file that is no version is kept.
         fs::write(at("rod-2.sdg"), "the user's").unwrap();
         for bytes in ["second", "third"] {
-            let path = other.own_path(&at("rod.sdg")).unwrap();
+            let path = other.own_path(&at("rod.sdg"), || one.versions.clone()).unwrap();
             assert_eq!(path, at("rod-3.sdg"));
             other.keep(&path, bytes.as_bytes(), version(60)).unwrap();
         }

@@ -20,7 +20,7 @@ use crate::marks::Marks;
 use crate::names::{file_name, free_numbered_except, safe_stem};
 use crate::picture::{Picture, png};
 use crate::preview::{Previews, SampleKey};
-use crate::project_file::ProjectPlace;
+use crate::project_file::{ProjectPlace, versions_in};
 use crate::session_state::State;
 use crate::teacher::GraspTeacher;
 use crate::teaching::Teaching;
@@ -71,7 +71,10 @@ fn model_file(home: &Path, label: &str) -> PathBuf {
 fn model_path(given: Option<&Path>, home: &Path, state: &State) -> Result<PathBuf> {
     match given {
         Some(path) => Ok(path.to_owned()),
-        None => state.models.own_path(&model_file(home, &state.label)),
+        None => {
+            let all = || versions_in(&state.models.project());
+            state.models.own_path(&model_file(home, &state.label), all)
+        }
     }
 }
 
