@@ -131,12 +131,16 @@ window.addEventListener("pagehide", keep);
 /** Adopts a session that was asked for: marks that another page or program has changed (the next change here would write over them), further pictures, removed photos, the name, the offered pictures, and the choice of model and region. */
 export async function adoptFrom(asked) {
   const before = state.images.map((target) => [target, target.revision]);
+  const tried = [...state.trialPictures];
   const session = await asked;
   keepStage(() => {
+    for (const target of tried) if (!session.trial_pictures.some(({ id }) => id === target.id)) drop(state.trialPictures, target);
     for (const [target, revision] of before) {
       const view = session.images.find(({ id }) => id === target.id);
-      if (!view) drop(state.images, target);
-      else if (revision === target.revision && !target.saving) adoptChange(target, view);
+      // A photo whose marks are not saved stays, with the reason.
+      if (!view) {
+        if (!isUnsaved(target)) drop(state.images, target);
+      } else if (revision === target.revision && !target.saving) adoptChange(target, view);
     }
     adoptSession(session);
   });

@@ -284,15 +284,18 @@ impl ProjectFile {
     }
 
     /// Adds the names of the missing files, so that the project still contains them: photos at their earlier places.
+    /// Removed files, which may have come back before, are left out.
     pub fn keep_missing(&mut self, gone: &Gone) {
         let place = |name: &String| gone.order.iter().position(|known| known == name).unwrap_or(usize::MAX);
         for name in &gone.photos {
-            if !self.photos.contains(name) {
+            if !self.photos.contains(name) && !self.removed.contains(name) {
                 let next = self.photos.iter().position(|other| place(other) > place(name));
                 self.photos.insert(next.unwrap_or(self.photos.len()), name.clone());
             }
         }
-        let is_new = |tried: &&Tried| self.tried.iter().all(|known| known.file != tried.file);
+        let is_new = |tried: &&Tried| {
+            !self.removed.contains(&tried.file) && self.tried.iter().all(|known| known.file != tried.file)
+        };
         let tried: Vec<Tried> = gone.tried.iter().filter(is_new).cloned().collect();
         self.tried.extend(tried);
     }

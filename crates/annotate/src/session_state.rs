@@ -306,9 +306,9 @@ impl State {
                 became: became.or_else(|| trial.missing_photo.clone()),
             });
         }
-        file.keep_missing(&self.gone);
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
         file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
+        file.keep_missing(&self.gone);
         // A picture that was removed and added again under the same name is not listed as removed.
         for there in file.photos.iter().chain(file.tried.iter().map(|tried| &tried.file)) {
             file.removed.remove(there);

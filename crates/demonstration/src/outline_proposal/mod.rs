@@ -89,9 +89,10 @@ fn outline_in(image: &RgbImage, bbox: &BoundingBox, known: Option<&Polygon>, str
         return nothing_found();
     }
     let Some(known) = known else { return outline };
-    // As in the traced outline: without pieces that a stroke cut off, and without holes that it closed.
-    let [was, is] = [&frame.pixels_of(known), &in_part].map(|marked| frame.largest_piece(marked));
-    let changed: Vec<bool> = was.iter().zip(&is).map(|(was, is)| was != is).collect();
+    // As in the traced outline, also pieces that a stroke cut off and holes that it closed are changed.
+    let before = frame.pixels_of(known);
+    let [was, is] = [&before, &in_part].map(|marked| frame.largest_piece(marked));
+    let changed: Vec<bool> = (0..was.len()).map(|at| before[at] != in_part[at] || was[at] != is[at]).collect();
     joined(&frame, known, &outline, &changed).unwrap_or(outline)
 }
 
@@ -238,6 +239,32 @@ mod tests {
         for x in [240.5, 270.5] {
             assert!(!corrected.contains(&Point2::new(x, 150.5)), "{corrected:?}");
         }
+    }
+
+    /// In the frame, the neck has no pixels, so that the end is a piece of its own.
+    #[test]
+    fn a_stroke_removes_an_end_behind_a_thin_neck() {
+        let (mut image, bbox) = disc(300, 50.0);
+        for (x, y) in (240..260).flat_map(|x| (140..161).map(move |y| (x, y))) {
+            image.put_pixel(x, y, Rgb([170, 60, 50]));
+        }
+        let bbox = BoundingBox { x2: 266.0, ..bbox };
+        let mut known = arc(150.0, 50.0, 1..72);
+        let neck_and_end = [
+            [200.0, 150.6],
+            [240.0, 150.6],
+            [240.0, 140.0],
+            [260.0, 140.0],
+            [260.0, 161.0],
+            [240.0, 161.0],
+            [240.0, 150.9],
+            [200.0, 150.9],
+        ];
+        known.vertices.extend(neck_and_end.map(Point2::from));
+        assert!(known.contains(&Point2::new(250.5, 150.5)));
+        let corrected = corrected_by((&image, &bbox), &known, [[243.0, 150.0], [257.0, 150.0]], false);
+        assert!(corrected.contains(&Point2::new(150.0, 150.0)));
+        assert!(!corrected.contains(&Point2::new(250.5, 150.5)), "{corrected:?}");
     }
 
     #[test]
