@@ -137,9 +137,11 @@ export async function adoptFrom(asked) {
     for (const target of tried) if (!session.trial_pictures.some(({ id }) => id === target.id)) drop(state.trialPictures, target);
     for (const [target, revision] of before) {
       const view = session.images.find(({ id }) => id === target.id);
-      // A photo whose marks are not saved stays, with the reason.
       if (!view) {
-        if (!isUnsaved(target)) drop(state.images, target);
+        if (isUnsaved(target)) toast(`${target.name} was removed in another window, without the last change here.`);
+        // Its number may be another photo's on another server.
+        target.isGone = true;
+        drop(state.images, target);
       } else if (revision === target.revision && !target.saving) adoptChange(target, view);
     }
     adoptSession(session);

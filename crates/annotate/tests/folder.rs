@@ -250,6 +250,9 @@ fn a_photo_that_comes_back_during_the_session_is_that_of_its_tried_picture() {
     assert_eq!(names(&session(&served)["others"]), ["found.png"]);
     served.ask("POST", "/api/others/0/photo", b"").json();
     assert_eq!(became(&served), 1);
+    // If it is then removed, it is not in the project when that is opened again.
+    served.ask("DELETE", "/api/images/1", b"").json();
+    assert_eq!(names(&session(&Served::of_photo(served.end(), "rod.png"))["images"]), ["rod.png"]);
 }
 
 #[test]

@@ -28,8 +28,10 @@ impl Simulated {
 
     /// As [`Self::start`], by another program that ends with the path of `sdg`.
     pub fn start_by(mut program: Command, further: &[&str]) -> Self {
-        // Two free neighbouring ports that no other test of this process will use.
-        let begin = 20_000 + std::process::id() as u16 % 20_000 + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 50;
+        // Two free neighbouring ports that no other test will use: tests run at the same time in processes with
+        // neighbouring numbers, each of which has twenty ports of its own.
+        let of_process = 20_000 + (std::process::id() % 600) as u16 * 20;
+        let begin = of_process + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 2;
         let port = (begin..60_000)
             .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
             .unwrap()
