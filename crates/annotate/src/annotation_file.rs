@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
-use sdg_files::{data_yaml_of, marks_of_photo, other_npy_of, write_atomically};
+use sdg_files::{changes_of, data_yaml_of, marks_of_photo, other_npy_of, write_atomically};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
@@ -56,15 +56,8 @@ impl Opened {
 
 /// The files that may have the marks of a picture whose marks are in `annotation`, the preferred one first: the file
 /// for changes if `annotation` is another tool's file, the one for changes by earlier programs, and `annotation`.
-/// Several pictures may have their marks in one `annotation`, so each has its own file for changes.
 pub fn files_of(picture: &Path, annotation: &Path) -> [PathBuf; 3] {
-    let earlier = annotation.with_extension("coco.json");
-    let changes = if annotation.file_stem() == picture.file_stem() {
-        earlier.clone()
-    } else {
-        annotation.with_extension(format!("{}.coco.json", file_name(picture)))
-    };
-    [changes, earlier, annotation.to_owned()]
+    [changes_of(picture, annotation), annotation.with_extension("coco.json"), annotation.to_owned()]
 }
 
 /// Reads the marks of a picture from the first existing file of [`files_of`] or, without `annotation`, of

@@ -268,7 +268,7 @@ fn weights_that_cannot_be_a_start_are_refused_before_teaching() {
         (
             &["--preset", "r50-torchvision"][..],
             2,
-            "--base-weights: the preset r50-torchvision needs base weights, and this build contains none for it",
+            "--base-weights: expected base weights for the preset r50-torchvision, found none in this build",
         ),
         (&["--reinit", "roi_heads"], 2, "--base-weights"),
         (&["--base-weights", "/nowhere.pth"], 1, "/nowhere.pth"),

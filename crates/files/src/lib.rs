@@ -47,5 +47,5 @@ pub use inputs::{
     check_extendable, check_readable, check_replaceable, check_writable, create, extend, is_same_file, keep, write,
 };
 pub use lock::{Access, Lock, WriterLock};
-pub use marks::{DATA_YAML, data_yaml_of, marks_of_photo, other_npy_of};
+pub use marks::{DATA_YAML, changes_of, data_yaml_of, marks_of_photo, other_npy_of};
 pub use standard_error::print_stderr;

@@ -29,6 +29,17 @@ pub fn marks_of_photo(photo: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
+/// The file into which `sdg annotate` writes a picture's marks if `marks`, from which it read them, is another tool's
+/// file and must be kept: `a.coco.json` for the marks of a.png in `a.json`, `labels.a.png.coco.json` for those in
+/// `labels.json`. Several pictures may have their marks in one file, so each has its own file for changes.
+pub fn changes_of(picture: &Path, marks: &Path) -> PathBuf {
+    if marks.file_stem() == picture.file_stem() {
+        return marks.with_extension("coco.json");
+    }
+    let name = picture.file_name().unwrap_or_default();
+    marks.with_extension(format!("{}.coco.json", name.to_string_lossy()))
+}
+
 /// The data.yaml of a YOLO label file, if there is one.
 pub fn data_yaml_of(labels: &Path) -> Option<PathBuf> {
     let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);

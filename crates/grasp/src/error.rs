@@ -152,9 +152,7 @@ pub enum GraspError {
     Detection(#[from] sdg_detection::DetectionError),
     /// A preset that needs base weights, in a build without weights for it.
     #[cfg(feature = "teach")]
-    #[error(
-        "the preset {preset} needs base weights, and this build contains none for it: expected base weights, found none"
-    )]
+    #[error("expected base weights for the preset {preset}, found none in this build")]
     NeedsBaseWeights { preset: &'static str },
     /// Base weights that cannot be read or belong to another network.
     #[cfg(feature = "teach")]

@@ -25,12 +25,7 @@ fn a_click_on_a_handle_changes_nothing_although_the_file_has_more_digits() {
 #[ignore = "make test-browser: needs Chromium"]
 fn a_drag_of_the_outline_s_line_adds_a_point_on_the_line_and_a_click_adds_none() {
     let page = Page::open();
-    page.browser.press(&["o"]).unwrap();
-    for corner in [[200.0, 180.0], [320.0, 180.0], [420.0, 285.0], [200.0, 285.0]] {
-        page.browser.drag(&[page.on_screen(corner)]).unwrap();
-    }
-    page.browser.press(&["\u{e007}"]).unwrap();
-    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.draw_outline(&[[200.0, 180.0], [320.0, 180.0], [420.0, 285.0], [200.0, 285.0]]);
     page.click("#do-outline h2");
     let before = page.saved().outline.unwrap();
     let [x, y] = page.on_screen([250.0, 285.0]);

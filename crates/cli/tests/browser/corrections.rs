@@ -359,12 +359,7 @@ fn a_gripper_on_a_thin_part_is_moved_by_its_middle() {
 #[ignore = "make test-browser: needs Chromium"]
 fn a_gripper_under_the_outline_is_taken_by_its_middle_and_ends() {
     let page = Page::open();
-    page.browser.press(&["o"]).unwrap();
-    for corner in [[200.0, 180.0], [320.0, 180.0], [420.0, 285.0], [200.0, 285.0]] {
-        page.browser.drag(&[page.on_screen(corner)]).unwrap();
-    }
-    page.browser.press(&["\u{e007}"]).unwrap();
-    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.draw_outline(&[[200.0, 180.0], [320.0, 180.0], [420.0, 285.0], [200.0, 285.0]]);
     // The gripper's line lies on the slanted edge of the outline, far from the handles of the box.
     let line = [[360.0, 222.0], [370.0, 232.5], [380.0, 243.0]].map(|place| page.on_screen(place));
     page.browser.drag(&line).unwrap();

@@ -133,6 +133,16 @@ impl Page {
         self.browser.drag(&[corner(BOX[0], BOX[1]), middle, corner(BOX[2], BOX[3])]).unwrap();
     }
 
+    /// Draws an outline by hand, which has these corners, in the step of the outline.
+    pub fn draw_outline(&self, corners: &[[f64; 2]]) {
+        self.browser.press(&["o"]).unwrap();
+        for &corner in corners {
+            self.browser.drag(&[self.on_screen(corner)]).unwrap();
+        }
+        self.browser.press(&["\u{e007}"]).unwrap();
+        self.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    }
+
     /// Waits until the last action is shown, sent and answered.
     pub fn settle(&self) {
         let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(

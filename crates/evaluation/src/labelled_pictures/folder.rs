@@ -15,6 +15,7 @@ use sdg_cell::Perception;
 use sdg_demonstration::{
     AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance, PixelFrame,
 };
+use sdg_files::changes_of;
 use sdg_grasp::GraspModel;
 use sdg_inputs::marks_check::MarkedPhoto;
 use sdg_inputs::why_unreadable;
@@ -183,16 +184,6 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         left_out.push(LeftOut { file: file_name(picture), why: "no label file names it".to_owned() });
     }
     Ok(assigned)
-}
-
-/// The file into which `sdg annotate` writes changes of a picture's labels if `labels` is another tool's file, as in
-/// crates/annotate/src/annotation_file.rs.
-fn changes_of(picture: &Path, labels: &Path) -> PathBuf {
-    if labels.file_stem() == picture.file_stem() {
-        labels.with_extension("coco.json")
-    } else {
-        labels.with_extension(format!("{}.coco.json", file_name(picture)))
-    }
 }
 
 /// The pictures that a label file labels.
