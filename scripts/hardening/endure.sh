@@ -30,6 +30,8 @@ for section in "${sections[@]}"; do
             endurance refusals
             ;;
         soak)
+            mkdir -p target/endurance
+            cc -O2 -shared -fPIC -o target/endurance/heap.so scripts/hardening/heap.c
             endurance frames --frames "$frames" --max-secs "$secs"
             endurance frames --frames $((frames / 10)) --every-frame --max-secs "$secs"
             endurance frames --model C --frames $((frames / 5)) --every-frame --max-secs "$secs"

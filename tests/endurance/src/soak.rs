@@ -11,8 +11,8 @@ use std::fmt;
 use std::fs;
 use std::io::{BufRead, BufReader, Cursor, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::Path;
-use std::process::{Child, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -26,26 +26,31 @@ use crate::scenario::Places;
 
 /// Longer than any frame takes on a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Maximum ratio of the memory in the last tenth to that in the fifth: the allocator keeps some for itself.
-const MAX_GROWTH: f64 = 1.05;
-/// Maximum growth in KiB if the memory is small: about one block of the allocator.
-const MAX_GROWTH_KIB: u64 = 4 << 10;
+/// Maximum growth of the heap's bytes in use from the fifth tenth to the last, in KiB and as a ratio. Each tenth's least
+/// value counts, because a frame in work needs memory for a moment.
+const MAX_HEAP_GROWTH_KIB: u64 = 256;
+const MAX_HEAP_GROWTH: f64 = 1.01;
+/// Maximum ratio of the resident memory in the last tenth to that in the fifth. The program keeps freed memory, in one
+/// heap for all threads, so its size is that of the most unfavourable moment so far.
+const MAX_RESIDENT_GROWTH: f64 = 1.25;
 /// Maximum ratio of the processor time per unit in the last tenth to that in the fifth: other programs take part of the
 /// caches.
 const MAX_SLOWER: f64 = 1.15;
 const NUM_FRAMES: u32 = 16;
 
 /// The memory, threads and descriptors of a process, and its processor time so far.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Held {
-    memory_kib: u64,
+    resident_kib: u64,
+    /// The heap's memory in use.
+    heap_kib: u64,
     threads: u64,
     descriptors: u64,
     cpu_secs: f64,
 }
 
 impl Held {
-    fn of(pid: u32) -> Result<Self> {
+    fn of(pid: u32, heap: &Path) -> Result<Self> {
         let status = fs::read_to_string(format!("/proc/{pid}/status"))?;
         let field = |name: &str| {
             let line = status.lines().find_map(|line| line.strip_prefix(name)).context("expected a field of status")?;
@@ -55,8 +60,10 @@ impl Held {
         // The name, in brackets, may contain blanks.
         let after_name = stat.rsplit(')').next().unwrap_or_default();
         let ticks: Vec<u64> = after_name.split_whitespace().skip(11).take(2).filter_map(|n| n.parse().ok()).collect();
+        let in_use: u64 = fs::read_to_string(heap)?.trim().parse().context("expected the heap's bytes in use")?;
         Ok(Self {
-            memory_kib: field("VmRSS:")?,
+            resident_kib: field("VmRSS:")?,
+            heap_kib: in_use >> 10,
             threads: field("Threads:")?,
             descriptors: fs::read_dir(format!("/proc/{pid}/fd"))?.count() as u64,
             // `/proc` counts a hundred ticks per second, independent of the kernel's own clock.
@@ -69,10 +76,13 @@ impl Held {
 #[derive(Debug, Default)]
 struct Course(Vec<Held>);
 
-/// The largest values in a tenth of the run, and its processor time.
+/// A tenth of a run: the largest values, the least memory in use, and the processor time of a unit.
 #[derive(Debug, Clone, Copy)]
 struct Tenth {
-    most: Held,
+    resident_kib: u64,
+    heap_kib: u64,
+    threads: u64,
+    descriptors: u64,
     cpu_secs_each: f64,
 }
 
@@ -83,43 +93,48 @@ impl Course {
         let cpu_secs =
             units.last().map_or(0.0, |last| last.cpu_secs) - units.first().map_or(0.0, |first| first.cpu_secs);
         Tenth {
-            most: Held {
-                memory_kib: most(|held| held.memory_kib),
-                threads: most(|held| held.threads),
-                descriptors: most(|held| held.descriptors),
-                cpu_secs,
-            },
+            resident_kib: most(|held| held.resident_kib),
+            heap_kib: units.iter().map(|held| held.heap_kib).min().unwrap_or_default(),
+            threads: most(|held| held.threads),
+            descriptors: most(|held| held.descriptors),
             cpu_secs_each: cpu_secs / (units.len() - 1).max(1) as f64,
         }
     }
 
-    /// Prints and compares the fifth tenth and the last; the first four are the start-up. Processor time is compared
-    /// only if every unit does the same work.
+    /// Prints all tenths, and compares the fifth with the last; the first four are the start-up. Processor time is
+    /// compared only if every unit does the same work.
     fn report(&self, what: impl fmt::Display, secs: f64, is_work_the_same: bool) -> Result<()> {
         ensure!(self.0.len() >= 30, "expected at least 30 units, found {}", self.0.len());
-        let [early, late] = [4, 9].map(|idx| self.tenth(idx));
-        let show = |tenth: &Tenth| {
-            let Held { memory_kib, threads, descriptors, .. } = tenth.most;
-            format!(
-                "{:.1} MB, {threads} threads, {descriptors} descriptors, {:.1} ms of processor each",
-                memory_kib as f64 / 1024.0,
-                tenth.cpu_secs_each * 1e3
-            )
+        println!("{what} in {secs:.0} s, by tenth:");
+        let tenths: Vec<Tenth> = (0..10).map(|idx| self.tenth(idx)).collect();
+        let row = |name: &str, of: &dyn Fn(&Tenth) -> String| {
+            println!("  {name}: {}", tenths.iter().map(of).collect::<Vec<_>>().join(" "));
         };
-        println!("{what} in {secs:.0} s: fifth tenth {}; last tenth {}", show(&early), show(&late));
-        let memory = (0..10).map(|idx| format!("{:.1}", self.tenth(idx).most.memory_kib as f64 / 1024.0));
-        println!("  most memory of each tenth, MB: {}", memory.collect::<Vec<_>>().join(" "));
-        let (before, after) = (early.most, late.most);
-        let may_be = ((before.memory_kib as f64 * MAX_GROWTH) as u64).max(before.memory_kib + MAX_GROWTH_KIB);
-        ensure!(after.memory_kib <= may_be, "{what}: memory grows");
-        ensure!(after.threads <= before.threads, "{what}: threads grow");
-        ensure!(after.descriptors <= before.descriptors, "{what}: descriptors grow");
+        row("heap in use, at least, MB", &|tenth| format!("{:.2}", tenth.heap_kib as f64 / 1024.0));
+        row("resident memory, at most, MB", &|tenth| format!("{:.1}", tenth.resident_kib as f64 / 1024.0));
+        row("threads, at most", &|tenth| tenth.threads.to_string());
+        row("descriptors, at most", &|tenth| tenth.descriptors.to_string());
+        row("processor time of a unit, ms", &|tenth| format!("{:.1}", tenth.cpu_secs_each * 1e3));
+        let (early, late) = (tenths[4], tenths[9]);
+        let grown = |before: u64, ratio: f64| (before as f64 * ratio) as u64;
+        let heap_kib = grown(early.heap_kib, MAX_HEAP_GROWTH).max(early.heap_kib + MAX_HEAP_GROWTH_KIB);
+        ensure!(late.heap_kib <= heap_kib, "{what}: the heap grows");
+        ensure!(late.resident_kib <= grown(early.resident_kib, MAX_RESIDENT_GROWTH), "{what}: memory grows");
+        ensure!(late.threads <= early.threads, "{what}: threads grow");
+        ensure!(late.descriptors <= early.descriptors, "{what}: descriptors grow");
         ensure!(
             !is_work_the_same || late.cpu_secs_each <= early.cpu_secs_each * MAX_SLOWER + 1e-3,
             "{what}: the last tenth is slower"
         );
         Ok(())
     }
+}
+
+/// The file with the heap's bytes in use, which the preloaded library writes.
+fn watch_heap(command: &mut Command, folder: &Path, library: &Path) -> PathBuf {
+    let file = folder.join("heap");
+    command.env("LD_PRELOAD", library).env("HEAP_FILE", &file);
+    file
 }
 
 /// The pendulum's photo, shifted a little from frame to frame along a closed path.
@@ -178,7 +193,7 @@ pub struct FrameRun {
 ///
 /// # Errors
 /// A run that grows, slows down, or ends early.
-pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
+pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
     let model = model(places, &run.model)?;
     let frames = frames(places)?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -194,7 +209,7 @@ pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
     let folder = places.work.join("soak");
     fresh(&folder)?;
     let mut command = places.sdg(&folder, &arguments);
-    command.stderr(Stdio::null());
+    let heap = watch_heap(command.stderr(Stdio::null()), &folder, library);
     let mut child = command.spawn()?;
     let output = BufReader::new(child.stdout.take().context("expected a pipe")?);
     let (start, mut course) = (Instant::now(), Course::default());
@@ -204,7 +219,7 @@ pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
         if !line.contains("\"detections\"") {
             continue;
         }
-        course.0.push(Held::of(child.id())?);
+        course.0.push(Held::of(child.id(), &heap)?);
         if course.0.len() == planned || start.elapsed().as_secs() >= run.max_secs {
             break;
         }
@@ -270,7 +285,7 @@ fn connection(
 ///
 /// # Errors
 /// The errors of [`detect`].
-pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
+pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> Result<()> {
     let folder = places.work.join("soak");
     fresh(&folder)?;
     fs::create_dir(folder.join("state"))?;
@@ -279,8 +294,9 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     // The page reads the shipped marks and returns them in the form that it expects.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
-    let mut server =
-        places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]).stderr(Stdio::null()).spawn()?;
+    let mut command = places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]);
+    let heap = watch_heap(command.stderr(Stdio::null()), &folder, library);
+    let mut server = command.spawn()?;
     let served = Page::of(server.stdout.take().context("expected a pipe")?)?;
     let marks = served.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
     served.ask("DELETE", "/api/projects", b"")?;
@@ -291,7 +307,7 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
         served.ask("PUT", "/api/images/0/marks", marks.as_bytes())?;
         served.mark_teach_and_try(&photo)?;
         served.ask("DELETE", "/api/projects", b"")?;
-        course.0.push(Held::of(server.id())?);
+        course.0.push(Held::of(server.id(), &heap)?);
         // The disk is not under test.
         remove(&folder.join(&name))?;
     }

@@ -90,8 +90,9 @@ where
         &self.inner
     }
 
-    /// Sends a goal and requests its result; `None` if the server refuses the goal. An unanswered goal is cancelled,
-    /// and sent again if the server does not know it.
+    /// Sends a goal and requests its result; `None` if the server refuses the goal. A goal that is not
+    /// answered, or whose answer cannot be read, is cancelled; an unanswered one is sent again if the server does not
+    /// know it.
     ///
     /// # Errors
     /// No answer in time, and errors reported by the network.
@@ -115,6 +116,15 @@ where
 
     fn send_once(&self, goal: G, timeout: Duration) -> Result<Sent, RosError> {
         let (request, id) = self.inner.send_goal(Wire(Ok(goal))).map_err(|error| network(&self.name, error))?;
+        let sent = self.acceptance(request, id, timeout);
+        if sent.is_err() {
+            // The server may have accepted the goal, and nobody would follow it.
+            let _ = self.ask_to_cancel(id, timeout);
+        }
+        sent
+    }
+
+    fn acceptance(&self, request: ros2_client::RmwRequestId, id: GoalId, timeout: Duration) -> Result<Sent, RosError> {
         let answer = self.inner.goal_client().async_receive_response(request);
         let Some(answer) = wait_for(answer, Some(Instant::now() + timeout)) else { return Ok(Sent::Unanswered(id)) };
         if !answer.map_err(|error| network(&self.name, error))?.accepted {
