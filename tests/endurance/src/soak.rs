@@ -291,15 +291,16 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> 
     fs::create_dir(folder.join("state"))?;
     let demonstrations = places.root.join("datasets/demonstrations/pendulum");
     let photo = fs::read(demonstrations.join("image.png"))?;
-    // The page reads the shipped marks and returns them in the form that it expects.
+    // A page of its own reads the shipped marks and returns them in the form that the page expects.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
-    let mut command = places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]);
-    let heap = watch_heap(command.stderr(Stdio::null()), &folder, library);
-    let mut server = command.spawn()?;
-    let served = Page::of(server.stdout.take().context("expected a pipe")?)?;
-    let marks = served.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
-    served.ask("DELETE", "/api/projects", b"")?;
+    let (mut reader, page) =
+        serve_page(&mut places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]))?;
+    let marks = page.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
+    end(&mut reader)?;
+    let mut command = places.sdg(&folder, &["annotate", "--no-browser", "--json"]);
+    let heap = watch_heap(&mut command, &folder, library);
+    let (mut server, served) = serve_page(&mut command)?;
     let (start, mut course) = (Instant::now(), Course::default());
     while course.0.len() < sessions && start.elapsed().as_secs() < max_secs {
         let name = format!("part{}", course.0.len());
@@ -313,6 +314,12 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> 
     }
     end(&mut server)?;
     course.report(format!("{} page sessions", course.0.len()), start.elapsed().as_secs_f64(), true)
+}
+
+fn serve_page(command: &mut Command) -> Result<(Child, Page)> {
+    let mut server = command.stderr(Stdio::null()).spawn()?;
+    let page = Page::of(server.stdout.take().context("expected a pipe")?)?;
+    Ok((server, page))
 }
 
 fn remove(folder: &Path) -> Result<()> {
