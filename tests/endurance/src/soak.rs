@@ -210,8 +210,8 @@ pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
     fresh(&folder)?;
     let mut command = places.sdg(&folder, &arguments);
     let heap = watch_heap(command.stderr(Stdio::null()), &folder, library);
-    let mut child = command.spawn()?;
-    let output = BufReader::new(child.stdout.take().context("expected a pipe")?);
+    let mut child = Running(command.spawn()?);
+    let output = BufReader::new(child.0.stdout.take().context("expected a pipe")?);
     let (start, mut course) = (Instant::now(), Course::default());
     for line in output.lines() {
         let line = line?;
@@ -219,13 +219,13 @@ pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
         if !line.contains("\"detections\"") {
             continue;
         }
-        course.0.push(Held::of(child.id(), &heap)?);
+        course.0.push(Held::of(child.0.id(), &heap)?);
         if course.0.len() == planned || start.elapsed().as_secs() >= run.max_secs {
             break;
         }
         let _ = printed.send(());
     }
-    end(&mut child)?;
+    drop(child);
     let done = course.0.len();
     ensure!(done == planned || start.elapsed().as_secs() >= run.max_secs, "ended after {done} of {planned} frames");
     let how = if run.every_frame { "each searched" } else { "followed" };
@@ -234,10 +234,14 @@ pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
     course.report(what, start.elapsed().as_secs_f64(), run.every_frame)
 }
 
-fn end(child: &mut Child) -> Result<()> {
-    child.kill()?;
-    child.wait()?;
-    Ok(())
+/// A process that ends with this value, also after an error.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// Serves motion JPEG: sends a frame, then the next one after a line was printed; closes the connection after `each`
@@ -294,13 +298,12 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> 
     // A page of its own reads the shipped marks and returns them in the form that the page expects.
     fs::copy(demonstrations.join("image.png"), folder.join("photo.png"))?;
     fs::copy(demonstrations.join("annotation.json"), folder.join("photo.json"))?;
-    let (mut reader, page) =
-        serve_page(&mut places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]))?;
+    let (reader, page) = serve_page(&mut places.sdg(&folder, &["annotate", "photo.png", "--no-browser", "--json"]))?;
     let marks = page.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
-    end(&mut reader)?;
+    drop(reader);
     let mut command = places.sdg(&folder, &["annotate", "--no-browser", "--json"]);
     let heap = watch_heap(&mut command, &folder, library);
-    let (mut server, served) = serve_page(&mut command)?;
+    let (server, served) = serve_page(&mut command)?;
     let (start, mut course) = (Instant::now(), Course::default());
     while course.0.len() < sessions && start.elapsed().as_secs() < max_secs {
         let name = format!("part{}", course.0.len());
@@ -308,17 +311,17 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> 
         served.ask("PUT", "/api/images/0/marks", marks.as_bytes())?;
         served.mark_teach_and_try(&photo)?;
         served.ask("DELETE", "/api/projects", b"")?;
-        course.0.push(Held::of(server.id(), &heap)?);
+        course.0.push(Held::of(server.0.id(), &heap)?);
         // The disk is not under test.
         remove(&folder.join(&name))?;
     }
-    end(&mut server)?;
+    drop(server);
     course.report(format!("{} page sessions", course.0.len()), start.elapsed().as_secs_f64(), true)
 }
 
-fn serve_page(command: &mut Command) -> Result<(Child, Page)> {
-    let mut server = command.stderr(Stdio::null()).spawn()?;
-    let page = Page::of(server.stdout.take().context("expected a pipe")?)?;
+fn serve_page(command: &mut Command) -> Result<(Running, Page)> {
+    let mut server = Running(command.stderr(Stdio::null()).spawn()?);
+    let page = Page::of(server.0.stdout.take().context("expected a pipe")?)?;
     Ok((server, page))
 }
 
