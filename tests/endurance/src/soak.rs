@@ -132,11 +132,14 @@ impl Course {
     }
 }
 
-/// The file with the heap's bytes in use, which the preloaded library writes.
-fn watch_heap(command: &mut Command, folder: &Path, library: &Path) -> PathBuf {
+/// Preloads the library that reports the heap's memory in use (scripts/hardening/heap.c); returns the file into which it
+/// writes.
+fn watch_heap(command: &mut Command, folder: &Path, places: &Places) -> Result<PathBuf> {
+    let library = places.work.join("heap.so");
+    ensure!(library.exists(), "expected {}, which `make endure SECTION=soak` makes, found no file", library.display());
     let file = folder.join("heap");
     command.env("LD_PRELOAD", library).env("HEAP_FILE", &file);
-    file
+    Ok(file)
 }
 
 /// The pendulum's photo, shifted a little from frame to frame along a closed path.
@@ -195,7 +198,7 @@ pub struct FrameRun {
 ///
 /// # Errors
 /// A run that grows, slows down, or ends early.
-pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
+pub fn detect(run: &FrameRun, places: &Places) -> Result<()> {
     let model = model(places, &run.model)?;
     let frames = frames(places)?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -211,7 +214,7 @@ pub fn detect(run: &FrameRun, places: &Places, library: &Path) -> Result<()> {
     let folder = places.work.join("soak");
     fresh(&folder)?;
     let mut command = places.sdg(&folder, &arguments);
-    let heap = watch_heap(command.stderr(Stdio::null()), &folder, library);
+    let heap = watch_heap(command.stderr(Stdio::null()), &folder, places)?;
     let mut child = Running(command.spawn()?);
     let output = BufReader::new(child.0.stdout.take().context("expected a pipe")?);
     let (start, mut course) = (Instant::now(), Course::default());
@@ -291,7 +294,7 @@ fn connection(
 ///
 /// # Errors
 /// The errors of [`detect`].
-pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> Result<()> {
+pub fn page(sessions: usize, max_secs: u64, places: &Places) -> Result<()> {
     let folder = places.work.join("soak");
     fresh(&folder)?;
     fs::create_dir(folder.join("state"))?;
@@ -304,7 +307,7 @@ pub fn page(sessions: usize, max_secs: u64, places: &Places, library: &Path) -> 
     let marks = page.json("GET", "/api/session", b"")?["images"][0]["marks"].to_string();
     drop(reader);
     let mut command = places.sdg(&folder, &["annotate", "--no-browser", "--json"]);
-    let heap = watch_heap(&mut command, &folder, library);
+    let heap = watch_heap(&mut command, &folder, places)?;
     let (server, served) = serve_page(&mut command)?;
     let (start, mut course) = (Instant::now(), Course::default());
     while course.0.len() < sessions && start.elapsed().as_secs() < max_secs {

@@ -90,9 +90,8 @@ where
         &self.inner
     }
 
-    /// Sends a goal and requests its result; `None` if the server refuses the goal. A goal that is not
-    /// answered, or whose answer cannot be read, is cancelled; an unanswered one is sent again if the server does not
-    /// know it.
+    /// Sends a goal and requests its result; `None` if the server refuses the goal. A goal is cancelled if it is not
+    /// answered or if its answer cannot be read; an unanswered goal is sent again if the server does not know it.
     ///
     /// # Errors
     /// No answer in time, and errors reported by the network.
@@ -118,7 +117,7 @@ where
         let (request, id) = self.inner.send_goal(Wire(Ok(goal))).map_err(|error| network(&self.name, error))?;
         let sent = self.acceptance(request, id, timeout);
         if sent.is_err() {
-            // The server may have accepted the goal, and nobody would follow it.
+            // The server may have accepted the goal, and would execute it although the caller has no handle to it.
             let _ = self.ask_to_cancel(id, timeout);
         }
         sent

@@ -14,7 +14,7 @@ fn main() {
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod sections {
     use std::fs;
-    use std::path::{Path, PathBuf};
+    use std::path::PathBuf;
 
     use anyhow::{Context, Result, ensure};
     use clap::{Parser, Subcommand, ValueEnum};
@@ -66,9 +66,6 @@ mod sections {
             /// Search every frame on its own instead of tracking parts.
             #[arg(long)]
             every_frame: bool,
-            /// The library that reports the heap's memory in use, from scripts/hardening/heap.c.
-            #[arg(long, default_value = "target/endurance/heap.so")]
-            heap: PathBuf,
             /// Number of frames after which the camera closes its connection.
             #[arg(long, default_value_t = usize::MAX)]
             frames_a_connection: usize,
@@ -80,9 +77,6 @@ mod sections {
         Page {
             #[arg(long, default_value_t = 500)]
             sessions: usize,
-            /// The library that reports the heap's memory in use, from scripts/hardening/heap.c.
-            #[arg(long, default_value = "target/endurance/heap.so")]
-            heap: PathBuf,
             /// Stop after this many seconds and report the finished part.
             #[arg(long, default_value_t = 600)]
             max_secs: u64,
@@ -96,10 +90,6 @@ mod sections {
             commands.iter().filter_map(|command| Some(format!("{:#}", run(*command).err()?))).collect();
         ensure!(failed.is_empty(), "{}", failed.join("\n"));
         Ok(())
-    }
-
-    fn library(path: &Path) -> Result<PathBuf> {
-        path.canonicalize().with_context(|| format!("{}: `make endure` makes it", path.display()))
     }
 
     pub fn run() -> Result<()> {
@@ -117,11 +107,10 @@ mod sections {
                 each(&commands, |command| crash::kill(command, kills, seed, &places, flakey.as_ref()))
             }
             Section::Refusals { commands } => each(&commands, |command| refusals::try_all(command, &places)),
-            Section::Frames { model, frames, every_frame, heap, frames_a_connection, max_secs } => {
-                let run = FrameRun { model, frames, every_frame, frames_a_connection, max_secs };
-                soak::detect(&run, &places, &library(&heap)?)
+            Section::Frames { model, frames, every_frame, frames_a_connection, max_secs } => {
+                soak::detect(&FrameRun { model, frames, every_frame, frames_a_connection, max_secs }, &places)
             }
-            Section::Page { sessions, heap, max_secs } => soak::page(sessions, max_secs, &places, &library(&heap)?),
+            Section::Page { sessions, max_secs } => soak::page(sessions, max_secs, &places),
         }
     }
 }
