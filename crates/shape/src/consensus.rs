@@ -14,7 +14,7 @@ use pulp::{Simd, WithSimd};
 
 use crate::capture_range::{CaptureRange, step_units};
 use crate::edge_points::EdgePoint;
-use crate::lanes::{LANES, in_lanes};
+use crate::lanes::{LANES, in_lanes, larger};
 use crate::pose::Pose;
 use crate::sightings::{EdgePlace, FIRST_REACH, Group, LATER_REACH, Sightings};
 use crate::template::{MatchedLevel, TemplateLevel};
@@ -133,7 +133,7 @@ fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
 /// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: needs no exponential and ignores distant residuals.
 #[inline(always)]
 fn kernel(x: f32) -> f32 {
-    let rest = (1.0 - x * x / 9.0).max(0.0);
+    let rest = larger(1.0 - x * x / 9.0, 0.0);
     rest * rest
 }
 

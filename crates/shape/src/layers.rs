@@ -4,6 +4,7 @@
 use safetensors::SafeTensors;
 
 use crate::error::ShapeError;
+use crate::lanes::larger;
 
 /// A convolution of 3×3 pixels with zero padding, followed by a rectifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,7 +176,7 @@ pub(crate) fn pooled<const CHANNELS: usize>(map: &[f32]) -> Vec<f32> {
     for pixel in map.chunks_exact(CHANNELS) {
         for c in 0..CHANNELS {
             mean[c] += pixel[c] / count;
-            max[c] = f32::max(max[c], pixel[c]);
+            max[c] = larger(pixel[c], max[c]);
         }
     }
     pooled
@@ -194,7 +195,7 @@ pub(crate) fn answered<const HIDDEN: usize>(values: &[f32], hidden: &Linear, ans
 
 #[inline(always)]
 fn rectified(value: f32) -> f32 {
-    value.max(0.0)
+    larger(value, 0.0)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use image::RgbImage;
 use wide::{f32x4, i32x4};
 
 use crate::gradient_field::whole;
+use crate::lanes::{larger, smaller};
 
 /// A picture whose colours are interpolated between its pixels.
 #[derive(Clone, Copy)]
@@ -50,9 +51,9 @@ impl<'a> PixelReader<'a> {
         let (mut along, mut below, mut idxs) = ([0.0; N], [0.0; N], [0u32; N]);
         let [right, bottom] = self.last_pair;
         for k in 0..N {
-            let u = (x[k] - 0.5).max(0.0).min(right + 1.0);
-            let v = (y[k] - 0.5).max(0.0).min(bottom + 1.0);
-            let (col, row) = (u.floor().min(right).max(0.0), v.floor().min(bottom).max(0.0));
+            let u = smaller(larger(x[k] - 0.5, 0.0), right + 1.0);
+            let v = smaller(larger(y[k] - 0.5, 0.0), bottom + 1.0);
+            let (col, row) = (larger(smaller(u.floor(), right), 0.0), larger(smaller(v.floor(), bottom), 0.0));
             along[k] = u - col;
             below[k] = v - row;
             idxs[k] = whole(row).wrapping_mul(self.width).wrapping_add(whole(col));

@@ -8,7 +8,7 @@ use wide::f32x4;
 
 use crate::edge_points::parabola_peak;
 use crate::gradient_field::GradientLevel;
-use crate::lanes::{LANES, in_lanes};
+use crate::lanes::{LANES, in_lanes, larger};
 
 /// Search distance of an edge point along its normal in the first round, in level pixels. Chosen by hand, not measured.
 pub(crate) const FIRST_REACH: usize = 6;
@@ -130,7 +130,7 @@ fn crests(samples: &Samples, floor: f32, double: [f32; 2], reach: usize) -> Opti
     let mut trusts = [0.0f32; 2 * LANES];
     for (k, sample) in samples.iter().enumerate() {
         let [dx, dy, energy, _] = sample.to_array();
-        trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
+        trusts[k] = larger(dx * double[0] + dy * double[1], 0.0);
         squares[k] = trusts[k] * (energy + floor);
     }
     // Most samples are not crests: all are compared at once, because single branches are often mispredicted.

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use crate::lanes::in_lanes;
+use crate::lanes::{in_lanes, larger};
 
 /// Distance between windows, in pixels; a window is three times as wide.
 pub(super) const CELL: usize = 3;
@@ -148,7 +148,7 @@ impl Expected {
             let (products, seen) = (window_means(&products, self.side), window_means(&seen, self.side));
             for (cell, best) in best.iter_mut().enumerate() {
                 let of_both = ((self.energy[cell] + EMPTY) * (seen[cell] + EMPTY)).sqrt();
-                *best = best.max(products[cell] / of_both);
+                *best = larger(products[cell] / of_both, *best);
             }
         }
         best

@@ -4,6 +4,7 @@ use wide::f32x4;
 
 use super::tensors::{BAND, Planes, structure_tensors, tensors_of_part};
 use crate::config::GradientConfig;
+use crate::lanes::{larger, smaller};
 use crate::parallel;
 
 /// The value of one pixel: `[d.x, d.y, tr]` (see the module's legend).
@@ -118,8 +119,8 @@ impl GradientLevel {
             return None;
         }
         // Within half a pixel of the border the border pixel's value is repeated.
-        let u = (x - 0.5).max(0.0).min(last[0]);
-        let v = (y - 0.5).max(0.0).min(last[1]);
+        let u = smaller(larger(x - 0.5, 0.0), last[0]);
+        let v = smaller(larger(y - 0.5, 0.0), last[1]);
         let (col, row) = ((u as i32).min(last_pair[0]), (v as i32).min(last_pair[1]));
         let (fx, fy) = (u - col as f32, v - row as f32);
         let at = self.idx_of(row as usize, col as usize);
@@ -149,9 +150,9 @@ impl GradientLevel {
         for k in 0..N {
             let is_inside = (x[k] >= 0.0) & (y[k] >= 0.0) & (x[k] <= size[0]) & (y[k] <= size[1]);
             inside[k] = if is_inside { 1.0 } else { 0.0 };
-            let u = (x[k] - 0.5).max(0.0).min(last[0]);
-            let v = (y[k] - 0.5).max(0.0).min(last[1]);
-            let (col, row) = (u.floor().min(last_pair[0]), v.floor().min(last_pair[1]));
+            let u = smaller(larger(x[k] - 0.5, 0.0), last[0]);
+            let v = smaller(larger(y[k] - 0.5, 0.0), last[1]);
+            let (col, row) = (smaller(u.floor(), last_pair[0]), smaller(v.floor(), last_pair[1]));
             fx[k] = u - col;
             fy[k] = v - row;
             idxs[k] = whole(row).wrapping_mul(stride).wrapping_add(whole(col)).wrapping_sub(before);

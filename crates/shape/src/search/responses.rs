@@ -21,7 +21,7 @@ use std::f32::consts::TAU;
 use pulp::{Simd, WithSimd};
 
 use crate::gradient_field::{GradientLevel, whole};
-use crate::lanes::in_lanes;
+use crate::lanes::{in_lanes, larger};
 use crate::parallel;
 
 /// Directions over 180°; neighbours are 11.25° apart, which costs at most 2 % of the cosine. Derived from that loss and
@@ -190,7 +190,7 @@ impl WithSimd for Responded<'_> {
         let Self { x, y, direction, out } = self;
         for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
             let cosine = x * direction[0] + y * direction[1];
-            *out = whole((cosine.max(0.0) * f32::from(FULL) + 0.5).floor()) as u8;
+            *out = whole((larger(cosine, 0.0) * f32::from(FULL) + 0.5).floor()) as u8;
         }
     }
 }
