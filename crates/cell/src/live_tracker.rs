@@ -72,7 +72,7 @@ impl LiveTracker {
                 let (due, searches) = channel::<PartSearch>();
                 let (finished, done) = channel();
                 let work = move || {
-                    for search in searches {
+                    while let Some(search) = newest(&searches) {
                         let outcome = match &pool {
                             Some(pool) => pool.install(|| search.run()),
                             None => search.run(),
@@ -143,6 +143,14 @@ impl Searches {
     }
 }
 
+/// Waits for a search and returns the newest one; `None` if no more will come. The tracker requests a search only when
+/// it waits for none, so it abandoned the earlier ones. With their pictures they would fill the channel of a busy
+/// machine.
+fn newest<T>(searches: &Receiver<T>) -> Option<T> {
+    let first = searches.recv().ok()?;
+    Some(searches.try_iter().last().unwrap_or(first))
+}
+
 impl Drop for LiveTracker {
     /// Waits for a running search.
     fn drop(&mut self) {
@@ -153,5 +161,23 @@ impl Drop for LiveTracker {
                 let _ = thread.join();
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_newest_of_the_waiting_searches_is_run() {
+        let (due, searches) = channel();
+        for number in 0..3 {
+            due.send(number).unwrap();
+        }
+        assert_eq!(newest(&searches), Some(2));
+        due.send(3).unwrap();
+        drop(due);
+        assert_eq!(newest(&searches), Some(3));
+        assert_eq!(newest(&searches), None);
     }
 }
