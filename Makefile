@@ -21,8 +21,8 @@ build: setup ## Builds target/release/sdg
 demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
 	target/release/sdg demo
 
-web: setup ## Builds the page that detects in the browser into target/web
-	@scripts/web.sh
+web: setup ## Builds the page that detects in the browser into target/web (CARD=no: without the module for graphics cards)
+	@CARD="$(CARD)" scripts/web.sh
 
 site: setup web ## Builds the site of all guides into target/site (mdBook from its registry, once)
 	@scripts/site.sh
@@ -79,7 +79,7 @@ test-browser: build ## Tests the program's pages in headless Chromium
 
 test-web: build web ## Tests the page that detects in the browser, in headless Chromium
 	@scripts/install.sh chromium chromium-driver
-	$(CARGO) test $(RELEASE) --locked --workspace --test browser -- --ignored --test-threads 1
+	$(CARGO) test $(RELEASE) --locked --workspace --test browser -- --ignored --test-threads 1 $(if $(filter no,$(CARD)),--skip graphics_card)
 
 film: build ## Makes the pictures of the front page, the tour and the gallery, datasets/pictures
 	@scripts/install.sh chromium chromium-driver

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Builds the browser's page into target/web: the WebAssembly modules (target/web/webgpu has the one for graphics cards), the
 # JavaScript that calls them, the page's own files. The result is a folder that any static host serves. Called by `make web`.
+#
+#   CARD=no   without the module for graphics cards, for which burn is compiled once more (ten minutes on two cores)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -31,12 +33,13 @@ build_module() {
 
 rm -rf "$out.new"
 build_module "$out.new"
-build_module "$out.new/webgpu" --features webgpu
+[ "${CARD:-}" = no ] || build_module "$out.new/webgpu" --features webgpu
 cp crates/web/page/* "$out.new"
 # Replaced at once, so an open page never loads half of it.
 rm -rf "$out"
 mv "$out.new" "$out"
 
 compressed() { find "$@" -type f -exec gzip -9 -c {} + | wc -c; }
-echo "$out: $(($(compressed "$out" -maxdepth 1) / 1024)) KiB to download compressed, and $(($(compressed "$out/webgpu") / 1024)) KiB" \
-    "more for the graphics card; to view it: python3 -m http.server --directory $out"
+of_card=
+[ "${CARD:-}" = no ] || of_card=", and $(($(compressed "$out/webgpu") / 1024)) KiB more for the graphics card"
+echo "$out: $(($(compressed "$out" -maxdepth 1) / 1024)) KiB to download compressed$of_card; to view it: python3 -m http.server --directory $out"

@@ -109,7 +109,7 @@ fn a_camera_that_is_stopped_while_it_starts_or_is_unplugged_is_switched_off() {
 
 #[test]
 #[ignore = "needs Chromium and target/web: make test-web"]
-fn the_end_of_a_search_by_another_device_is_no_error() {
+fn the_end_of_a_search_by_the_graphics_card_is_no_error() {
     let made = Made::new();
     let model = made.model("S");
     let site = site();

@@ -41,7 +41,7 @@ fn results_of_the_model_before_are_discarded() {
 
 #[test]
 #[ignore = "needs Chromium and target/web: make test-web"]
-fn a_model_stays_open_if_the_graphics_card_fails() {
+fn a_model_stays_open_on_a_host_without_the_module_of_the_card() {
     let made = Made::new();
     let model = made.model("S");
     // A host without the folder of the module for the graphics card.
@@ -66,7 +66,7 @@ fn a_model_stays_open_if_the_graphics_card_fails() {
 
 #[test]
 #[ignore = "needs Chromium and target/web: make test-web"]
-fn a_model_opens_on_the_device_chosen_last() {
+fn a_model_opens_on_the_processor_if_the_graphics_card_was_not_chosen_last() {
     let made = Made::new();
     let model = made.model("S");
     let site = site();
