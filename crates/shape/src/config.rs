@@ -19,7 +19,8 @@ pub struct ShapeConfig {
     /// Weight of an edge on the outline relative to one inside, where shading moves with the light. Chosen by hand, not
     /// measured.
     pub outline_weight: f64,
-    /// Largest error of an initial pose in x and in y, as a share of the image's width. Chosen by hand, not measured.
+    /// Largest error of an initial pose in x and in y, as a share of the image's width; at most 40 pixels. Chosen by
+    /// hand, not measured.
     pub capture_shift: f64,
     /// Largest error of an initial pose's angle, in radians. Chosen by hand, not measured.
     pub capture_angle_rad: f64,
