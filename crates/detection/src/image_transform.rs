@@ -58,28 +58,21 @@ impl ImageTransform {
             return Err(DetectionError::EmptyImage { width: original_width, height: original_height });
         }
         let (width, height) = part_size(self.config.resize, [original_width, original_height], whole);
-        let resized: Vec<f32> = match self.config.filter {
-            ResizeFilter::AntialiasedBytes => {
-                resample::antialiased_bytes(image, width, height).into_iter().map(f32::from).collect()
-            }
-            ResizeFilter::Bilinear => resample::bilinear(image, width, height),
-        };
         let range = match self.config.pixel_range {
             PixelRange::Byte => 1.0,
             PixelRange::Unit => 255.0,
         };
-        let num_pixels = width * height;
-        let mut pixels = vec![0f32; 3 * num_pixels];
-        for (channel, plane) in pixels.chunks_exact_mut(num_pixels).enumerate() {
-            let source = match self.config.channel_order {
-                ChannelOrder::Rgb => channel,
-                ChannelOrder::Bgr => 2 - channel,
-            };
-            let (mean, std) = (self.config.mean[channel], self.config.std[channel]);
-            for (value, rgb) in plane.iter_mut().zip(resized.chunks_exact(3)) {
-                *value = (rgb[source] / range - mean) / std;
+        let normalised =
+            |value: f32, channel: usize| (value / range - self.config.mean[channel]) / self.config.std[channel];
+        let pixels = match self.config.filter {
+            ResizeFilter::AntialiasedBytes => {
+                // A byte has 256 values.
+                let table: [[f32; 256]; 3] = [0, 1, 2].map(|c| std::array::from_fn(|byte| normalised(byte as f32, c)));
+                let bytes = resample::antialiased_bytes(image, width, height);
+                self.planes(&bytes, |byte, channel| table[channel][usize::from(byte)])
             }
-        }
+            ResizeFilter::Bilinear => self.planes(&resample::bilinear(image, width, height), normalised),
+        };
         Ok(TransformedImage {
             pixels,
             height,
@@ -87,6 +80,19 @@ impl ImageTransform {
             original_height: original_height as usize,
             original_width: original_width as usize,
         })
+    }
+
+    /// One plane for each channel of the network, from interleaved RGB.
+    fn planes<T: Copy>(&self, rgb: &[T], normalised: impl Fn(T, usize) -> f32) -> Vec<f32> {
+        let mut pixels = Vec::with_capacity(rgb.len());
+        for channel in 0..3 {
+            let source = match self.config.channel_order {
+                ChannelOrder::Rgb => channel,
+                ChannelOrder::Bgr => 2 - channel,
+            };
+            pixels.extend(rgb.chunks_exact(3).map(|rgb| normalised(rgb[source], channel)));
+        }
+        pixels
     }
 }
 

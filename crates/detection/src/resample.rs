@@ -1,9 +1,12 @@
 //! Two resizing methods, each with the same or nearly the same results as a reference implementation.
 
 use image::RgbImage;
+use sdg_kernels::for_each_stretch;
 
 /// Fraction bits of Pillow's fixed-point filter coefficients.
 const PRECISION_BITS: u32 = 22;
+/// Rows that one thread takes at a time.
+const BAND: usize = 16;
 
 /// One output position of a separable filter: its first input, and the weights from this input on.
 struct Taps {
@@ -49,34 +52,40 @@ pub fn antialiased_bytes(image: &RgbImage, width: usize, height: usize) -> Vec<u
         rows.copy_from_slice(source);
     } else {
         let taps = triangle_taps(in_width, width);
-        for (out, row) in rows.chunks_exact_mut(width * 3).zip(source.chunks_exact(in_width * 3)) {
-            for (pixel, tap) in out.chunks_exact_mut(3).zip(&taps) {
-                let mut sums = [0i32; 3];
-                for (rgb, weight) in row[tap.first * 3..].chunks_exact(3).zip(&tap.weights) {
-                    for (sum, value) in sums.iter_mut().zip(rgb) {
-                        *sum += i32::from(*value) * weight;
+        for_each_stretch(&mut rows, BAND * width * 3, |band, rows| {
+            let sources = source[band * BAND * in_width * 3..].chunks_exact(in_width * 3);
+            for (out, row) in rows.chunks_exact_mut(width * 3).zip(sources) {
+                for (pixel, tap) in out.chunks_exact_mut(3).zip(&taps) {
+                    let mut sums = [0i32; 3];
+                    for (rgb, weight) in row[tap.first * 3..].chunks_exact(3).zip(&tap.weights) {
+                        for (sum, value) in sums.iter_mut().zip(rgb) {
+                            *sum += i32::from(*value) * weight;
+                        }
                     }
+                    pixel.copy_from_slice(&sums.map(round_to_byte));
                 }
-                pixel.copy_from_slice(&sums.map(round_to_byte));
             }
-        }
+        });
     }
     if height == in_height {
         return rows;
     }
     let mut resized = vec![0u8; height * width * 3];
-    let mut sums = vec![0i32; width * 3];
-    for (out, tap) in resized.chunks_exact_mut(width * 3).zip(&triangle_taps(in_height, height)) {
-        sums.fill(0);
-        for (row, weight) in rows[tap.first * width * 3..].chunks_exact(width * 3).zip(&tap.weights) {
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += i32::from(*value) * weight;
+    let taps = triangle_taps(in_height, height);
+    for_each_stretch(&mut resized, BAND * width * 3, |band, out| {
+        let mut sums = vec![0i32; width * 3];
+        for (out, tap) in out.chunks_exact_mut(width * 3).zip(&taps[band * BAND..]) {
+            sums.fill(0);
+            for (row, weight) in rows[tap.first * width * 3..].chunks_exact(width * 3).zip(&tap.weights) {
+                for (sum, value) in sums.iter_mut().zip(row) {
+                    *sum += i32::from(*value) * weight;
+                }
+            }
+            for (value, sum) in out.iter_mut().zip(&sums) {
+                *value = round_to_byte(*sum);
             }
         }
-        for (value, sum) in out.iter_mut().zip(&sums) {
-            *value = round_to_byte(*sum);
-        }
-    }
+    });
     resized
 }
 

@@ -85,6 +85,7 @@ pub use group_norm::{group_norm, group_norm_residual};
 pub use log_softmax::log_softmax;
 pub use memory::keep_freed_memory;
 pub use nms::{batched_nms, nms};
+pub use parallel::for_each_stretch;
 pub use params::AdamWParams;
 pub use params::CosineParams;
 pub use params::MaxPool2dParams;

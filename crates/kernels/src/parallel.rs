@@ -19,6 +19,17 @@ pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send
     (0..num_units).for_each(unit);
 }
 
+/// Calls `work` with each stretch of `len` values and its number, in any order, possibly at the same time.
+pub fn for_each_stretch<T: Send>(values: &mut [T], len: usize, work: impl Fn(usize, &mut [T]) + Sync + Send) {
+    #[cfg(all(feature = "parallel", not(target_arch = "wasm32")))]
+    {
+        use rayon::prelude::*;
+        values.par_chunks_mut(len).enumerate().for_each(|(number, values)| work(number, values));
+    }
+    #[cfg(not(all(feature = "parallel", not(target_arch = "wasm32"))))]
+    values.chunks_mut(len).enumerate().for_each(|(number, values)| work(number, values));
+}
+
 /// [`for_each_unit`] if `parallel`, otherwise sequentially.
 pub(crate) fn for_each_unit_if(parallel: bool, num_units: usize, unit: impl Fn(usize) + Sync + Send) {
     if parallel {
