@@ -101,6 +101,19 @@ pub fn adamw_value<B: Backend>(param: FloatTensor<B>, moments: FloatTensor<B>, p
     B::float_sub(kept, scaled::<B>(delta, params.learning_rate))
 }
 
+/// [`fully_connected`](crate::fully_connected()) by burn's product of matrices.
+pub fn fully_connected<B: Backend>(
+    x: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
+    activation: Activation,
+) -> FloatTensor<B> {
+    let [num_maps, features, inputs] = [x.shape()[0], weight.shape()[0], weight.shape()[1]];
+    let x = B::float_reshape(x, Shape::from([num_maps, inputs]));
+    let products = B::float_matmul(x, B::float_swap_dims(weight, 0, 1));
+    activated::<B>(B::float_add(products, B::float_reshape(bias, Shape::from([1, features]))), activation)
+}
+
 /// [`permute_maps`](crate::permute_maps) by burn's `select`.
 pub fn permute_maps<B: Backend>(x: FloatTensor<B>, order: &[usize]) -> FloatTensor<B> {
     let indices: Vec<i32> = order.iter().map(|&map| map as i32).collect();

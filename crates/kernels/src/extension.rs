@@ -6,6 +6,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
 use crate::composed;
+use crate::params::Activation;
 use crate::params::AdamWParams;
 use crate::params::CosineParams;
 use crate::params::FusedGroupNormParams;
@@ -97,6 +98,16 @@ pub trait KernelBackend: Backend {
         params: AdamWParams,
     ) -> FloatTensor<Self> {
         composed::adamw_value::<Self>(param, moments, params)
+    }
+
+    /// See [`fully_connected`](crate::fully_connected()).
+    fn kernel_fully_connected(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        activation: Activation,
+    ) -> FloatTensor<Self> {
+        composed::fully_connected::<Self>(x, weight, bias, activation)
     }
 
     /// See [`log_softmax`](crate::log_softmax()).

@@ -16,6 +16,7 @@ use crate::extension::KernelBackend;
 use crate::flex_tensor::{
     all_f32, channels_last, contiguous, last_values, shape4, tensor, tensor_channels_last, values,
 };
+use crate::fully_connected;
 use crate::group_norm;
 use crate::packed::{self, Keep};
 use crate::params::AdamWParams;
@@ -86,6 +87,18 @@ impl KernelBackend for Flex {
         let crops = roi_align::kernel::forward(last_values(&features), shape, values(&rois), &params);
         let [bins_y, bins_x] = params.output_size;
         tensor_channels_last(crops, [num_rois, shape[1], bins_y, bins_x])
+    }
+
+    fn kernel_fully_connected(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        activation: Activation,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&x, &weight, &bias]) {
+            return composed::fully_connected::<Self>(x, weight, bias, activation);
+        }
+        fully_connected::convolved::<Self>(x, weight, bias, activation)
     }
 
     fn kernel_group_norm(

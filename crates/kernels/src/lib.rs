@@ -2,9 +2,9 @@
 //!
 //! burn's CPU backend `Flex` runs a convolution forwards at a moderate speed and backwards through a generic fallback,
 //! and it has no ROIAlign. This crate adds faster convolutions (most 3×3 convolutions of stride 1 by Winograd's
-//! transforms, all others as matrix products that mostly read the maps in place), ROIAlign, and the other operations
-//! that took most of the training time: group norm, max pooling, upsampling, log-softmax, cosines between maps, AdamW's
-//! update, and non-maximum suppression.
+//! transforms, all others as matrix products that mostly read the maps in place), fully connected layers over maps,
+//! ROIAlign, and the other operations that took most of the training time: group norm, max pooling, upsampling,
+//! log-softmax, cosines between maps, AdamW's update, and non-maximum suppression.
 //!
 //! ```text
 //! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`
@@ -58,6 +58,7 @@ mod elementwise;
 mod extension;
 mod flex;
 mod flex_tensor;
+mod fully_connected;
 mod group_norm;
 mod log_softmax;
 mod memory;
@@ -81,6 +82,7 @@ pub use adamw::adamw;
 pub use conv::{Conv2dEpilogue, conv_transpose2d, conv2d, conv2d_fused};
 pub use cosines::cosines;
 pub use extension::KernelBackend;
+pub use fully_connected::fully_connected;
 pub use group_norm::{group_norm, group_norm_residual};
 pub use log_softmax::log_softmax;
 pub use memory::keep_freed_memory;

@@ -10,8 +10,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kernels::{
     Activation, AdamWParams, Conv2dEpilogue, Conv2dParams, GroupNormParams, MaxPool2dParams, RoiAlignParams,
-    RoiAlignment, SamplingRatio, adamw, conv_transpose2d, conv2d_fused, group_norm_residual, max_pool2d, permute_maps,
-    roi_align, upsample_nearest_2x,
+    RoiAlignment, SamplingRatio, adamw, conv_transpose2d, conv2d_fused, fully_connected, group_norm_residual,
+    max_pool2d, permute_maps, roi_align, upsample_nearest_2x,
 };
 
 /// Maximum difference, relative to the largest magnitude: sums of up to a thousand products in a different order.
@@ -105,6 +105,16 @@ fn convolutions_agree() {
 /// Output size of a convolution of a map of 13 × 17 pixels.
 fn output_size(params: Conv2dParams, kernel: usize) -> [usize; 2] {
     [13, 17].map(|size| (size + 2 * params.padding[0] - kernel) / params.stride[0] + 1)
+}
+
+#[test]
+fn fully_connected_layers_agree() {
+    for activation in [Activation::Identity, Activation::Relu] {
+        assert_agrees("fully_connected", [[3, 16, 7, 7], [20, 16 * 49, 1, 1]], |[x, weight], device| {
+            let output = fully_connected(x, weight.reshape([20, 16 * 49]), random([20], 7, device), activation);
+            output.reshape([3, 20, 1, 1])
+        });
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
+use sdg_kernels::Activation;
 
 use crate::initialization::{Distribution, Initializer};
 
@@ -30,5 +31,14 @@ impl Linear {
     /// - output: `[N, out]`
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         x.matmul(self.weight.val().transpose()) + self.bias.val().unsqueeze()
+    }
+
+    /// [`Self::forward`] of flattened maps, and an activation.
+    ///
+    /// # Shapes
+    /// - `x`: `[N, C, H, W]` with `C·H·W = in`
+    /// - output: `[N, out]`
+    pub fn forward_maps(&self, x: Tensor<4>, activation: Activation) -> Tensor<2> {
+        sdg_kernels::fully_connected(x, self.weight.val(), self.bias.val(), activation)
     }
 }

@@ -4,6 +4,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, activation};
+use sdg_kernels::Activation;
 use sdg_layers::{Distribution, Initializer, Linear};
 
 use crate::box_coder::BoxCoder;
@@ -47,10 +48,9 @@ impl BoxHead {
 
     /// Returns the hidden values `[R, F]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<2> {
-        let pooled = pool(features, rois, &self.pooler);
-        let [r, c, s, _] = pooled.dims();
-        let hidden = activation::relu(self.fc1.forward(pooled.reshape([r, c * s * s])));
-        activation::relu(self.fc2.forward(hidden))
+        let hidden = self.fc1.forward_maps(pool(features, rois, &self.pooler), Activation::Relu);
+        let [num_rois, width] = hidden.dims();
+        self.fc2.forward_maps(hidden.reshape([num_rois, width, 1, 1]), Activation::Relu)
     }
 }
 

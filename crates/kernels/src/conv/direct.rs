@@ -16,6 +16,8 @@ const UNIT_POSITIONS: usize = 96;
 /// Approximate number of positions per unit if the unit copies its input: neighbouring rows share the copy, so larger
 /// units are better.
 const COPYING_UNIT_POSITIONS: usize = 240;
+/// Maximum number of floats of a run that are multiplied at a time, so that a panel's part remains in a near cache.
+const BLOCK_DEPTH: usize = 2048;
 /// Target number of units, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;
 
@@ -39,6 +41,19 @@ pub(crate) struct Target {
     pub(crate) step: [usize; 2],
 }
 
+/// Positions whose inputs are one run of floats each, at equal steps in memory.
+#[derive(Clone, Copy)]
+struct Runs {
+    /// Number of positions.
+    count: usize,
+    /// Floats from the start of one run to the next.
+    step: usize,
+    /// Floats of a run.
+    len: usize,
+    /// Output pixel of the first position.
+    pixel: usize,
+}
+
 /// A convolution, or one phase of a transposed convolution.
 pub(crate) struct DirectConv<'a> {
     pub(crate) source: Maps<'a>,
@@ -60,17 +75,23 @@ impl DirectConv<'_> {
     /// # Safety
     /// Nothing else accesses the grid's pixels of `output`.
     pub(crate) unsafe fn run(&self, isa: Isa, output: Raw) {
-        let pointwise = self.window == [1, 1]
-            && self.stride == [1, 1]
-            && self.first == [0, 0]
-            && self.grid == self.source.size
-            && self.grid == self.target.size;
-        if pointwise {
-            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
-            unsafe { self.run_pointwise(isa, output) };
-        } else {
-            // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
-            unsafe { self.run_window(isa, output) };
+        let Maps { num_images, size: [height, width], channels, .. } = self.source;
+        let Target { size, origin, .. } = self.target;
+        let reach = |axis: usize| self.window[axis] + (self.grid[axis] - 1) * self.stride[axis];
+        let pointwise = self.window == [1, 1] && self.stride == [1, 1] && self.grid == [height, width];
+        let from_first = self.first == [0, 0];
+        // SAFETY: the caller promises that nothing else accesses the target's pixels of `output`.
+        unsafe {
+            if from_first && pointwise && self.grid == size {
+                let runs = Runs { count: num_images * height * width, step: channels, len: channels, pixel: 0 };
+                self.run_runs(isa, output, runs);
+            } else if from_first && num_images == 1 && self.grid[0] == 1 && self.window[0] == 1 && reach(1) <= width {
+                let (step, len) = (self.stride[1] * channels, self.window[1] * channels);
+                let pixel = origin[0] * size[1] + origin[1];
+                self.run_runs(isa, output, Runs { count: self.grid[1], step, len, pixel });
+            } else {
+                self.run_window(isa, output);
+            }
         }
     }
 
@@ -78,23 +99,40 @@ impl DirectConv<'_> {
         self.filters.columns.div_ceil(PANEL)
     }
 
-    unsafe fn run_pointwise(&self, isa: Isa, output: Raw) {
-        let Maps { values, num_images, size, channels } = self.source;
-        let rows = num_images * size[0] * size[1];
-        let chunks = rows.div_ceil(UNIT_POSITIONS).max(MIN_UNITS.min(rows.div_ceil(12)));
-        let chunk = rows.div_ceil(chunks).next_multiple_of(12);
-        let chunks = rows.div_ceil(chunk);
+    /// Computes positions whose input is one run of floats each.
+    ///
+    /// # Safety
+    /// As for [`Self::run`].
+    unsafe fn run_runs(&self, isa: Isa, output: Raw, runs: Runs) {
+        let values = self.source.values;
+        let Runs { count, step, len, pixel } = runs;
+        let blocks = len.div_ceil(BLOCK_DEPTH);
+        // Deep weights are larger than the caches, and each chunk reads all of them.
+        let min_chunks = if blocks == 1 { MIN_UNITS.min(count.div_ceil(12)) } else { 1 };
+        let chunks = count.div_ceil(UNIT_POSITIONS).max(min_chunks);
+        let chunk = count.div_ceil(chunks).next_multiple_of(12);
+        let chunks = count.div_ceil(chunk);
         let groups = MIN_UNITS.div_ceil(chunks).min(self.num_panels());
         for_each_unit(chunks * groups, |unit| {
             let (first, group) = (unit / groups * chunk, unit % groups);
-            let end = rows.min(first + chunk);
-            let next = &values[end * channels..rows.min(end + chunk) * channels];
-            for panel in self.panels_of(group, groups) {
-                let left = Operand { values: &values[first * channels..], step: channels, inner: 1, outer: 0 };
-                let mut product = self.product(panel, chunk.min(rows - first), left, [1, channels], first);
-                product.prefetch = self.prefetch(panel, self.panels_of(group, groups).end, next);
-                // SAFETY: a unit has its own rows and panels.
-                unsafe { product.run(isa, output) };
+            let end = count.min(first + chunk);
+            let next = if blocks == 1 { &values[end * step..count.min(end + chunk) * step] } else { &[] };
+            for block in 0..blocks {
+                let [start, stop] = [block * len / blocks, (block + 1) * len / blocks];
+                let at = first * step + start;
+                let left = Operand { values: &values[at..], step, inner: 1, outer: 0 };
+                for panel in self.panels_of(group, groups) {
+                    let pixel = pixel + first * self.target.step[1];
+                    let mut product = self.product(panel, end - first, left, [1, stop - start], pixel);
+                    product.right.values = &product.right.values[start * product.right.inner..];
+                    product.accumulate = block > 0;
+                    if block + 1 < blocks {
+                        product.epilogue = Epilogue::default();
+                    }
+                    product.prefetch = self.prefetch(panel, self.panels_of(group, groups).end, start, next);
+                    // SAFETY: a unit has its own positions and panels.
+                    unsafe { product.run(isa, output) };
+                }
             }
         });
     }
@@ -177,10 +215,15 @@ impl DirectConv<'_> {
         }
     }
 
-    /// The data read after a panel: the next panel or, after the last panel before `end`, the next unit's positions
-    /// (`next`).
-    fn prefetch<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Prefetch<'a> {
-        let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
+    /// The data read after a panel: the next panel from row `start` of its depth on or, after the last panel before
+    /// `end`, the next unit's positions (`next`).
+    fn prefetch<'a>(&'a self, panel: usize, end: usize, start: usize, next: &'a [f32]) -> Prefetch<'a> {
+        let run = if panel + 1 < end {
+            let (values, width) = self.filters.panel(0, panel + 1);
+            &values[start * width..]
+        } else {
+            next
+        };
         Prefetch { runs: [run, &[]] }
     }
 

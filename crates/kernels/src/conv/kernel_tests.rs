@@ -136,6 +136,13 @@ fn every_path_agrees_with_plain_loops() {
         // Several units of work and several blocks of positions.
         ([1, 24, 40, 70], [8, 3, 3], [1, 1], [1, 1]),
         ([3, 9, 30, 41], [11, 3, 3], [1, 1], [1, 1]),
+        // One row of positions: windows side by side, with gaps, overlapping, deeper than one block, several units of work.
+        ([1, 16, 1, 35], [33, 1, 5], [1, 5], [0, 0]),
+        ([1, 4, 1, 61], [9, 1, 2], [1, 5], [0, 0]),
+        ([1, 16, 1, 60], [5, 1, 3], [1, 2], [0, 0]),
+        ([1, 48, 1, 250], [40, 1, 50], [1, 50], [0, 0]),
+        ([1, 3, 1, 900], [7, 1, 4], [1, 4], [0, 0]),
+        ([2, 2100, 1, 7], [8, 1, 1], [1, 1], [0, 0]),
         // Winograd's method: whole and clipped tiles, every padding, one panel and several, many tiles and few.
         ([1, 16, 3, 3], [16, 3, 3], [1, 1], [1, 1]),
         ([2, 16, 8, 9], [48, 3, 3], [1, 1], [1, 1]),
