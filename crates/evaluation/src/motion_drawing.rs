@@ -9,7 +9,7 @@ use sdg_report::{Animation, AnimationOptions};
 use sdg_robot::PlannedArm;
 use sdg_robot::workcell::Workcell as CellFile;
 use sdg_simulation::scene::{SceneVariation, SeenPart};
-use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
+use sdg_simulation::{RenderConfig, Renderer, Tessellation, Workcell, WorkcellConfig};
 
 const DRY_RUN: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
 const PLAN: MotionDrawing = MotionDrawing { name: "plan", width_px: 480, fps: 10.0, max_frames: 100.0 };
@@ -40,7 +40,8 @@ impl MotionDrawing {
     /// Files cannot be written, or rendering fails.
     fn draw(&self, folder: &Path, config: &WorkcellConfig, positions: &[(JointVector, f64)]) -> Result<Vec<PathBuf>> {
         let mut cell = Workcell::new(config)?;
-        let render = RenderConfig { width: self.width_px, height: self.width_px * 3 / 4, ..RenderConfig::default() };
+        let [width, height] = [self.width_px, self.width_px * 3 / 4];
+        let render = RenderConfig { width, height, tessellation: Tessellation::Coarse, ..RenderConfig::default() };
         let mut renderer = Renderer::new(cell.data().model(), render)?;
         let frames = positions
             .iter()

@@ -81,7 +81,7 @@ pub use panda::{
 };
 pub use planning_problem::PlanningProblem;
 pub use record::RecordConfig;
-pub use render::{RenderConfig, Renderer, Segmentation};
+pub use render::{RenderConfig, Renderer, Segmentation, Tessellation};
 pub use workcell::{Workcell, WorkcellConfig};
 
 /// Loads MuJoCo and EGL, which the simulator and its pictures need. A call before a long computation reports missing

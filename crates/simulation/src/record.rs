@@ -7,7 +7,7 @@ use image::RgbImage;
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
 use crate::model::{Camera, Id, Model};
-use crate::render::{RenderConfig, Renderer};
+use crate::render::{RenderConfig, Renderer, Tessellation};
 
 /// Settings of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,9 +19,11 @@ pub struct RecordConfig {
 }
 
 impl Default for RecordConfig {
-    /// Eight pictures per second, small enough for an animation.
+    /// Six pictures per second, of the size of a report's animation, which shows twelve at twice the speed.
     fn default() -> Self {
-        Self { period_secs: 0.125, render: RenderConfig { width: 400, height: 300, ..RenderConfig::default() } }
+        let tessellation = Tessellation::Coarse;
+        let render = RenderConfig { width: 320, height: 240, tessellation, ..RenderConfig::default() };
+        Self { period_secs: 1.0 / 6.0, render }
     }
 }
 

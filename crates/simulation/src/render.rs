@@ -23,6 +23,15 @@ use crate::model::{Camera, Geom, Id, Model};
 /// Largest width and height of a picture, in pixels.
 pub(crate) const MAX_SIDE_PX: u32 = 8192;
 
+/// Number of triangles of round shapes and of faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tessellation {
+    /// As the model says, otherwise as MuJoCo does: 28 slices and 16 stacks of a sphere, 4 × 4 squares of a face.
+    Model,
+    /// Fewer, for small pictures of a whole workcell: without a GPU, most of their time goes into triangles.
+    Coarse,
+}
+
 /// Settings of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RenderConfig {
@@ -36,6 +45,8 @@ pub struct RenderConfig {
     pub shadow_size: u32,
     /// Whether reflective surfaces show the scene; it is then rendered twice.
     pub reflections: bool,
+    /// Number of triangles of shapes.
+    pub tessellation: Tessellation,
     /// Geom groups to render. By MuJoCo's convention, which the workcell follows, visible shapes are in groups 0 to 2
     /// and collision shapes in group 3.
     pub geom_groups: [bool; 6],
@@ -50,6 +61,7 @@ impl Default for RenderConfig {
             samples: 4,
             shadow_size: 1024,
             reflections: false,
+            tessellation: Tessellation::Model,
             geom_groups: [true, true, true, false, false, false],
         }
     }
@@ -130,6 +142,10 @@ impl Renderer {
         adjusted.vis.global.offheight = config.height as i32;
         adjusted.vis.quality.offsamples = config.samples as i32;
         adjusted.vis.quality.shadowsize = config.shadow_size as i32;
+        if config.tessellation == Tessellation::Coarse {
+            let quality = &mut adjusted.vis.quality;
+            (quality.numslices, quality.numstacks, quality.numquads) = (28, 8, 6);
+        }
 
         let _lock = drawing_lock();
         let context = OffscreenContext::new()?;
