@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the Python package's wheel for glibc 2.31 or later into target/packages/wheel, for ARCH=amd64 or arm64; part of `make release`.
 # `make wheel` builds one for the C library of this machine, without compiling burn again. With TRY=1 it is then used in Debian 11 (needs
-# root and mmdebstrap; amd64).
+# root and mmdebstrap).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source scripts/packages/arch.sh

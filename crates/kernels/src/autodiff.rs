@@ -20,7 +20,6 @@ use crate::conv::weight_gradient::weight_gradient;
 use crate::extension::KernelBackend;
 use crate::flex::convolved;
 use crate::flex_tensor::{all_f32, channels_last, last_values, shape4, tensor, tensor_channels_last, values};
-use crate::fully_connected;
 use crate::group_norm::kernel::{self as norm, Statistics};
 use crate::packed::Keep;
 use crate::params::CosineParams;
@@ -135,18 +134,6 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
             OpsKind::Tracked(prep) => prep.finish((rois, shape, params), crops),
             OpsKind::UnTracked(prep) => prep.finish(crops),
         }
-    }
-
-    fn kernel_fully_connected(
-        x: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        bias: FloatTensor<Self>,
-        activation: Activation,
-    ) -> FloatTensor<Self> {
-        if !all_f32([x.primitive(), weight.primitive(), bias.primitive()]) {
-            return composed::fully_connected::<Self>(x, weight, bias, activation);
-        }
-        fully_connected::convolved::<Self>(x, weight, bias, activation)
     }
 
     fn kernel_group_norm(

@@ -1,8 +1,9 @@
 //! A fully connected layer over whole maps.
 //!
-//! burn flattens the maps, which copies channels-last ones on one thread, and packs the weight for each product. On the
-//! CPU the layer is a convolution instead: N maps of H × W in a row are one map of 1 × N·H·W, and the weight is a kernel
-//! of 1 × H·W whose stride is its width. It reads the maps in place and keeps the packed weight.
+//! burn flattens the maps, which copies channels-last ones on one thread, and packs the weight for each product. In
+//! inference on the CPU the layer is a convolution instead: N maps of H × W in a row are one map of 1 × N·H·W, and the
+//! weight is a kernel of 1 × H·W whose stride is its width. It reads the maps in place and keeps the packed weight. In
+//! training, where the weight is packed for each step, this is hardly faster (2 % of a step of the `edge` preset).
 
 use burn::backend::Dispatch;
 use burn::backend::TensorMetadata;

@@ -9,14 +9,10 @@
 //!
 //! Sums over positions are divided into chunks by the shapes alone, computed separately and added in order.
 
-use std::sync::Arc;
-
-use super::direct::{DirectConv, Maps, Target, copy_row};
-use super::panels::Panels;
+use super::direct::{Maps, copy_row};
 use super::shape::ConvShape;
-use crate::elementwise::channels_last;
-use crate::parallel::{Output, SharedSlice, for_each_unit};
-use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch, packed_len, panel_width};
+use crate::parallel::{SharedSlice, for_each_unit};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch};
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
@@ -37,49 +33,7 @@ pub(crate) fn weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_>, shap
     {
         return grad;
     }
-    if shape.num_images == 1 && shape.out_size[0] == 1 && shape.kernel[0] == 1 && shape.params.padding == [0, 0] {
-        return row_weight_gradient(isa, x.values, output_grad.values, shape);
-    }
     direct_weight_gradient(isa, x, output_grad, shape)
-}
-
-/// The weight's gradient of one row of positions, such as a fully connected layer's: the transposed gradient of the
-/// output by the input, packed in panels. Read in place, both would be columns, whose lines share few sets of the caches.
-fn row_weight_gradient(isa: Isa, x: &[f32], output_grad: &[f32], shape: &ConvShape) -> Vec<f32> {
-    let (positions, out_channels) = (shape.out_size[1], shape.out_channels);
-    let run = shape.kernel[1] * shape.in_channels;
-    let step = shape.params.stride[1] * shape.in_channels;
-    let mut packed = Scratch::take(packed_len(run, positions));
-    let shared = SharedSlice::new(&mut packed);
-    for_each_unit(run.div_ceil(PANEL), |panel| {
-        let (first, width) = (panel * PANEL, panel_width(run, panel));
-        let count = PANEL.min(run - first);
-        // SAFETY: every unit has its own panel.
-        let target = unsafe { shared.range(first * positions, width * positions) };
-        for (position, target) in target.chunks_exact_mut(width).enumerate() {
-            let (values, rest) = target.split_at_mut(count);
-            values.copy_from_slice(&x[position * step + first..][..count]);
-            rest.fill(0.0);
-        }
-    });
-    let output_grad = channels_last(isa, output_grad, 1, positions, out_channels);
-    let product = DirectConv {
-        source: Maps { values: &output_grad, num_images: 1, size: [1, out_channels], channels: positions },
-        first: [0, 0],
-        window: [1, 1],
-        stride: [1, 1],
-        grid: [1, out_channels],
-        filters: &Panels { values: Arc::new(packed), columns: run, depth: positions },
-        epilogue: Epilogue::default(),
-        target: Target { size: [1, out_channels], origin: [0, 0], step: [1, 1] },
-    };
-    let sums = Output::new(out_channels * run);
-    // SAFETY: nothing else accesses the sums, and the grid is all of them.
-    let sums = unsafe {
-        product.run(isa, sums.raw());
-        sums.into_vec()
-    };
-    channels_last(isa, &sums, out_channels, shape.kernel[1], shape.in_channels)
 }
 
 /// The weight's gradient by plain sums over positions.

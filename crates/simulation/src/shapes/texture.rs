@@ -130,7 +130,14 @@ impl Noise {
     /// The noise at (u, v), both taken modulo 1.
     pub fn at(&self, u: f64, v: f64) -> f64 {
         let (x, y) = (wrapped(u) * self.columns as f64, wrapped(v) * self.rows as f64);
-        let value = |column: usize, row: usize| self.values[(row % self.rows) * self.columns + column % self.columns];
+        // Cheaper than a remainder: an index is at most two cells beyond the end.
+        let around = |mut idx: usize, len: usize| {
+            while idx >= len {
+                idx -= len;
+            }
+            idx
+        };
+        let value = |column, row| self.values[around(row, self.rows) * self.columns + around(column, self.columns)];
         let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
         let (column, row) = (x as usize, y as usize);
         let (a, b) = (smooth(x - column as f64), smooth(y - row as f64));
