@@ -116,7 +116,9 @@ impl DirectConv<'_> {
         for_each_unit(chunks * groups, |unit| {
             let (first, group) = (unit / groups * chunk, unit % groups);
             let end = count.min(first + chunk);
-            let next = if blocks == 1 { &values[end * step..count.min(end + chunk) * step] } else { &[] };
+            // The last position's step may end beyond the maps.
+            let next = [end, count.min(end + chunk)].map(|position| (position * step).min(values.len()));
+            let next = if blocks == 1 { &values[next[0]..next[1]] } else { &[] };
             for block in 0..blocks {
                 let [start, stop] = [block * len / blocks, (block + 1) * len / blocks];
                 let at = first * step + start;

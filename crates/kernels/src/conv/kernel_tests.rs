@@ -138,7 +138,7 @@ fn every_path_agrees_with_plain_loops() {
         ([3, 9, 30, 41], [11, 3, 3], [1, 1], [1, 1]),
         // One row of positions: windows side by side, with gaps, overlapping, deeper than one block, several units of work.
         ([1, 16, 1, 35], [33, 1, 5], [1, 5], [0, 0]),
-        ([1, 4, 1, 61], [9, 1, 2], [1, 5], [0, 0]),
+        ([1, 4, 1, 117], [9, 1, 2], [1, 5], [0, 0]),
         ([1, 16, 1, 60], [5, 1, 3], [1, 2], [0, 0]),
         ([1, 48, 1, 250], [40, 1, 50], [1, 50], [0, 0]),
         ([1, 3, 1, 900], [7, 1, 4], [1, 4], [0, 0]),
